@@ -1,0 +1,57 @@
+"""How every figure looks, and how it is saved so that equal data gives equal bytes."""
+
+from __future__ import annotations
+
+import io
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import write_whole
+
+_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "exneat",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "legend.frameon": False,
+    "font.size": 10,
+}
+_METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+
+
+def new_figure(width: float = 7.0, height: float = 4.2) -> Figure:
+    """An empty figure of the given size in inches, in the style of all figures."""
+    with style():
+        return Figure(figsize=(width, height), layout="constrained")
+
+
+def style() -> AbstractContextManager[None]:
+    """Context in which axes are made and figures saved."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def save_figure(figure: Figure, path: Path) -> list[Path]:
+    """Write ``path.png`` and ``path.svg``; returns both paths.
+
+    Raises:
+        ExneatError: they cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExneatError(f"{path.parent}: cannot be made: {error.strerror}") from error
+    written = []
+    for kind, metadata in _METADATA.items():
+        buffer = io.BytesIO()
+        with style():
+            figure.savefig(buffer, format=kind, metadata=metadata, dpi=150)
+        target = path.with_suffix(f".{kind}")
+        write_whole(target, buffer.getvalue())
+        written.append(target)
+    return written

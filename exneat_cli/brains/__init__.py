@@ -1,0 +1,7 @@
+"""Team and plan become flat arrays for one compiled kernel; also the brains that follow a fixed rule."""
+
+from exneat_cli.brains.assembly import assemble
+from exneat_cli.brains.brain import Brain, motionless
+from exneat_cli.brains.random_actions import RandomActions
+
+__all__ = ["Brain", "RandomActions", "assemble", "motionless"]

@@ -1,0 +1,96 @@
+"""`exneat inspect`: a run's wiring in words, or the list of runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import Champion, RunDirectory, find_runs, read_champion
+from exneat_cli.wiring import Module
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Print the wiring of ``run=<directory>``, or the runs below ``output=<directory>``.
+
+    Raises:
+        ExneatError: an argument is unknown, or the run has no champion to show.
+    """
+    values = {"output": "outputs"}
+    for argument in arguments:
+        key, separator, value = argument.partition("=")
+        if key not in ("run", "output") or not separator or not value:
+            raise ExneatError(f"{argument}: expected run=<run directory> or output=<root of runs>")
+        values[key] = value
+    if "run" in values:
+        _show(RunDirectory(Path(values["run"])))
+    else:
+        _list(Path(values["output"]))
+    return 0
+
+
+def _show(run: RunDirectory) -> None:
+    if not run.manifest.exists():
+        raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
+    manifest = run.read_manifest()
+    if not run.champion.exists():
+        why = "random actions have no networks" if manifest.get("arm") == "random" else "it is not finished"
+        raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
+    champion = read_champion(run.champion)
+    print(f"{run.path}  ({manifest['status']})")
+    kind = "feed-forward" if champion.feed_forward else "recurrent"
+    subpopulations = len(champion.plan.subpopulation_shapes)
+    print(f"{champion.arm}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
+    for module in champion.plan.modules:
+        _show_module(champion, module)
+    test = champion.scores["test"]
+    print(f"test: fitness {test['fitness_mean']:.1f} (sd {test['fitness_std']:.1f}), {test['episodes']} episodes")
+
+
+def _show_module(champion: Champion, module: Module) -> None:
+    genome = champion.genomes[module.subpopulation]
+    enabled = sum(gene.enabled for gene in genome.connections.values())
+    hidden = len(genome.nodes) - module.outputs
+    x, y = module.position
+    print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
+    print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
+    for line in _links(champion, module):
+        print(f"  reads    {line}")
+    drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
+    print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
+    print(f"  network  {len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs, ", end="")
+    print(f"{enabled} enabled of {len(genome.connections)} connections\n")
+
+
+def _links(champion: Champion, module: Module) -> Iterable[str]:
+    groups: dict[tuple[int, str, bool], list[int]] = {}
+    for pin in module.pins:
+        if pin.kind != "sensor":
+            groups.setdefault((pin.module, pin.kind, pin.delayed), []).append(pin.index)
+    for (source, kind, delayed), indices in groups.items():
+        when = "of the previous step" if delayed else "of this step"
+        yield f"{kind} {_ranges(indices)} of {champion.plan.modules[source].name}, {when}"
+
+
+def _list(output: Path) -> None:
+    runs = list(find_runs(output))
+    if not runs:
+        print(f"No runs below {output}; exneat train makes one.")
+        return
+    print(f"{'status':<12}{'seed':>5}  {'test fitness':>20}  run")
+    for run in runs:
+        manifest = run.read_manifest()
+        tested = manifest.get("result", {}).get("champion")
+        figure = f"{tested['fitness_mean']:.1f} (sd {tested['fitness_std']:.1f})" if tested else "-"
+        print(f"{manifest.get('status', '?'):<12}{manifest.get('seed', '?'):>5}  {figure:>20}  {run.path}")
+
+
+def _ranges(indices: Sequence[int]) -> str:
+    """Whole numbers in words, e.g. ``5-6, 19-20``; order is kept where it is not ascending."""
+    parts: list[list[int]] = []
+    for index in indices:
+        if parts and index == parts[-1][-1] + 1:
+            parts[-1].append(index)
+        else:
+            parts.append([index])
+    return ", ".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)

@@ -1,0 +1,59 @@
+"""`exneat train`: one run, or with -m one run per combination."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
+from omegaconf import DictConfig
+
+from exneat_cli.commands.composition import run_composed, settings_from
+from exneat_cli.errors import ExneatError
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Train; returns the exit code.
+
+    Raises:
+        ExneatError: the configuration or a run directory is unusable.
+    """
+    failures: list[str] = []
+
+    def job(config: DictConfig) -> None:
+        if HydraConfig.get().mode is not RunMode.MULTIRUN:
+            _train(config, arguments)
+            return
+        try:
+            _train(config, arguments)
+        except ExneatError as error:
+            overrides = " ".join(HydraConfig.get().overrides.task)
+            failures.append(overrides)
+            print(f"exneat: {overrides}: {error}", file=sys.stderr)
+
+    run_composed("exneat train", arguments, job)
+    if failures:
+        print(f"exneat: {len(failures)} of the jobs failed: {'; '.join(failures)}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _train(config: DictConfig, arguments: Sequence[str]) -> None:
+    settings = settings_from(config)
+    from exneat_cli.runs import progress_for_terminal, train
+
+    finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])
+    directory = finished.directory
+    if not finished.trained_now:
+        print(f"{directory.path} is finished already; nothing was trained.")
+    if not directory.plots.exists():
+        from exneat_cli.analysis import draw_path, draw_training
+
+        draw_path(directory)
+        if directory.history.exists():
+            draw_training(directory, settings.task.fitness_name)
+    print("\nWritten:")
+    for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
+        print(f"  {path}")
+    print(f"\n{finished.summary}")

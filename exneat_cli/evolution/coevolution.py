@@ -1,0 +1,139 @@
+"""Co-evolution of subpopulations that share one fitness, in ask/tell form.
+
+Source: Zhang (2025), section 3.1.2. The ask/tell shape lets the caller evaluate teams as it likes; a
+`tell` without an `ask` is refused, so no fitness can reach the wrong generation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import neat
+from numpy.random import SeedSequence
+
+from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.seeding import generator
+
+PAIRINGS = ("rank", "index")
+
+
+class Team(NamedTuple):
+    """One genome from each subpopulation, evaluated together.
+
+    Attributes:
+        genomes: in the order of the subpopulations.
+        ids: their ids; a team that meets the next generation intact keeps them.
+    """
+
+    genomes: tuple[neat.DefaultGenome, ...]
+    ids: tuple[int, ...]
+
+
+class Coevolution:
+    """Subpopulations that evolve on their own under a fitness that they share.
+
+    Args:
+        configs: one neat-python configuration per subpopulation, all of the same population size.
+        seeds: one per subpopulation.
+        pairing_seed: of the shuffle that pairs offspring.
+        pairing: ``rank`` lets survivors meet in the order of their teams' fitness, so the best team stays
+            together; ``index`` pairs in neat-python's own order.
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[neat.Config],
+        seeds: Sequence[SeedSequence],
+        pairing_seed: SeedSequence,
+        pairing: str = "rank",
+    ) -> None:
+        self._subpopulations = [Subpopulation(c, seed) for c, seed in zip(configs, seeds, strict=True)]
+        self._pairing = pairing
+        self._pairing_rng = generator(pairing_seed)
+        self._rank: list[dict[int, int]] = [{} for _ in configs]
+        self._teams: list[Team] | None = None
+        self._told: list[float] | None = None
+        self.extinctions = 0
+
+    @property
+    def species_count(self) -> int:
+        """Species of the current generation, summed over subpopulations."""
+        return sum(subpopulation.species_count for subpopulation in self._subpopulations)
+
+    def ask(self) -> list[Team]:
+        """The teams of the next generation; the first call gives the first one.
+
+        `extinctions` then tells how many subpopulations had to be created anew for it.
+
+        Raises:
+            RuntimeError: the teams that were asked for before were not told their fitness.
+        """
+        if self._teams is not None and self._told is None:
+            raise RuntimeError("ask: the last teams have no fitness yet; expected tell(fitness) before it")
+        if self._told is not None:
+            self._advance()
+        orders = [self._order(index) for index in range(len(self._subpopulations))]
+        self._teams = [
+            Team(tuple(s.genomes[key] for s, key in zip(self._subpopulations, ids, strict=True)), ids)
+            for ids in zip(*orders, strict=True)
+        ]
+        return list(self._teams)
+
+    def tell(self, fitness: Sequence[float]) -> None:
+        """Give every team of the last `ask` its fitness, in the same order.
+
+        Raises:
+            RuntimeError: there was no `ask` before.
+            ValueError: the number of values is wrong, or one is not finite.
+        """
+        if self._teams is None or self._told is not None:
+            raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
+        if len(fitness) != len(self._teams):
+            raise ValueError(f"tell: expected {len(self._teams)} fitness values, got {len(fitness)}")
+        for index, value in enumerate(fitness):
+            if not math.isfinite(value):
+                raise ValueError(f"tell: expected finite fitness values, got {value!r} for team {index}")
+        self._told = list(fitness)
+
+    def _advance(self) -> None:
+        assert self._teams is not None
+        assert self._told is not None
+        ranking = best_first(self._told)
+        shared = separate_ties(self._told) if len(self._subpopulations) > 1 else self._told
+        self.extinctions = 0
+        for index, subpopulation in enumerate(self._subpopulations):
+            self._rank[index] = {self._teams[team].ids[index]: rank for rank, team in enumerate(ranking)}
+            ids_to_fitness = {team.ids[index]: shared[i] for i, team in enumerate(self._teams)}
+            self.extinctions += subpopulation.advance(ids_to_fitness)
+        self._told = None
+
+    def _order(self, index: int) -> list[int]:
+        ids = list(self._subpopulations[index].genomes)
+        if self._pairing == "index":
+            return ids
+        rank = self._rank[index]
+        survivors = sorted((key for key in ids if key in rank), key=lambda key: rank[key])
+        offspring = [key for key in ids if key not in rank]
+        return survivors + [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
+
+
+def best_first(fitness: Sequence[float]) -> list[int]:
+    """Indices from the highest fitness to the lowest; of equals, the lower index comes first."""
+    return sorted(range(len(fitness)), key=lambda index: -fitness[index])
+
+
+def separate_ties(fitness: Sequence[float]) -> list[float]:
+    """The same values, pushed down by the least amounts that make them all differ.
+
+    Of equal values the one with the lower index stays the higher. Without this, neat-python breaks ties
+    by genome id, and two subpopulations would keep the genomes of different teams.
+    """
+    separated = list(fitness)
+    above = math.inf
+    for index in best_first(fitness):
+        if separated[index] >= above:
+            separated[index] = math.nextafter(above, -math.inf)
+        above = separated[index]
+    return separated

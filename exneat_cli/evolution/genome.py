@@ -1,0 +1,24 @@
+"""neat-python's genome, with initial hidden nodes that are homologous."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import neat
+from neat.genome import DefaultGenomeConfig
+
+
+class HomologousGenome(neat.DefaultGenome):  # type: ignore[misc]
+    """A genome whose initial hidden nodes have the same ids in every genome of a subpopulation.
+
+    neat-python counts on from genome to genome, so that no two initial genomes share a hidden node:
+    crossover and distance then see nothing in common, and every genome founds a species of its own.
+    """
+
+    def configure_new(self, config: DefaultGenomeConfig) -> None:
+        """Make an initial genome; nodes that mutations add later still get ids of their own."""
+        first_hidden = config.num_outputs
+        later_nodes = config.node_indexer or count(first_hidden + config.num_hidden)
+        config.node_indexer = count(first_hidden)
+        super().configure_new(config)
+        config.node_indexer = later_nodes

@@ -1,0 +1,58 @@
+"""`exneat <command> ...`: finds the command, and turns expected errors into one to three lines."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+from exneat_cli import __version__
+from exneat_cli.errors import ExneatError
+
+COMMANDS = {
+    "train": "train one arm with one seed; -m trains every combination",
+    "inspect": "show a run's wiring, or list the runs",
+}
+"""Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
+
+HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
+
+usage: exneat <command> [key=value ...]
+
+{commands}
+
+  exneat train task=ant geometry=all            one run of ExNEAT on Ant
+  exneat train task=ant algorithm=neat seed=3   the same task for NEAT
+  exneat train -m seed=0,1,2 noise.sensor_std=0,0.1
+  exneat train --help                           every setting with its default
+  exneat inspect                                the runs under outputs/
+  exneat inspect run=outputs/ant/<run>          one run's modules, sensors and joints
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code: 0 done, 2 refused, 130 interrupted.
+
+    Args:
+        arguments: without the program's name; None takes the process's own.
+    """
+    command, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if command in ("-h", "--help", "help"):
+        print(HELP.format(commands="\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())), end="")
+        return 0
+    if command in ("-V", "--version"):
+        print(f"exneat {__version__}")
+        return 0
+    try:
+        if command not in COMMANDS:
+            raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
+        code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
+        return code
+    except ExneatError as error:
+        print(f"exneat: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("exneat: interrupted; the same command with resume=true does the run again", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0

@@ -1,0 +1,36 @@
+"""Everything on disk: layout, columns, champions, manifests."""
+
+from exneat_cli.records import provenance
+from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.files import read_json, write_csv, write_json, write_whole
+from exneat_cli.records.history import HistoryRow, write_history
+from exneat_cli.records.run_directory import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    RUNNING,
+    RunDirectory,
+    configuration_hash,
+    find_runs,
+)
+
+__all__ = [
+    "DONE",
+    "FAILED",
+    "INTERRUPTED",
+    "RUNNING",
+    "Champion",
+    "HistoryRow",
+    "RunDirectory",
+    "configuration_hash",
+    "find_runs",
+    "provenance",
+    "read_champion",
+    "read_json",
+    "write_champion",
+    "write_csv",
+    "write_hall_of_fame",
+    "write_history",
+    "write_json",
+    "write_whole",
+]

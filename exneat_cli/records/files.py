@@ -1,0 +1,72 @@
+"""Writing files so that each is whole or absent, and reading them as data."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from exneat_cli.errors import ExneatError
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file by way of a temporary one, so that a reader or a crash never meets half of it.
+
+    Raises:
+        ExneatError: the disk is full, the directory is gone or not writable.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    try:
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write JSON for people: indented, keys in the order given, NaN refused.
+
+    Raises:
+        ExneatError: the file cannot be written.
+        ValueError: a number is not finite.
+    """
+    write_whole(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table; floats keep every digit, so equal numbers are equal bytes.
+
+    Raises:
+        ExneatError: the file cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([repr(float(v)) if isinstance(v, float) else v for v in row] for row in rows)
+    write_whole(path, text.getvalue())
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read one JSON object.
+
+    Raises:
+        ExneatError: the file is missing, unreadable, or no JSON object.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ExneatError(f"{path}: expected JSON, got something else: {error}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
+    return content

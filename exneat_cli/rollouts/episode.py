@@ -1,0 +1,103 @@
+"""The one loop that every episode of every task and brain runs in."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from exneat_cli.brains import Brain, RandomActions, brain, random_actions
+from exneat_cli.tasks import RUNNING, Simulation
+from exneat_cli.tasks.compiling import compiled, with_functions
+
+_BRAIN_FUNCTIONS = {Brain: brain, RandomActions: random_actions}
+
+
+def _episode(  # type: ignore[no-untyped-def]
+    world,
+    agent,
+    world_rng: Generator,
+    noise_rng: Generator,
+    sensor_std: float,
+    observation: NDArray[np.float64],
+    action: NDArray[np.float64],
+    totals: NDArray[np.float64],
+    trace: NDArray[np.float64],
+    located: int,
+):
+    """Run one episode; returns how it ended and how many steps it took.
+
+    The names reset, observe, step, locate, fresh_memory and activate are bound by `episode_loop`.
+
+    Args:
+        world: the task's storage.
+        agent: a brain.
+        world_rng: draws the world.
+        noise_rng: draws the sensor noise, in the order of the inputs.
+        sensor_std: sd of that noise; 0 draws nothing.
+        observation: buffer, (observation size,).
+        action: buffer, (action size,).
+        totals: (terms,), overwritten with the sums of the reward terms.
+        trace: (at least the longest episode + 1, located + terms) to record the path, or no rows.
+        located: how many columns of `trace` say where the agent is; the terms follow.
+    """
+    terms = np.zeros(totals.size)
+    totals[:] = 0.0
+    reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
+    memory = fresh_memory(agent)  # type: ignore[name-defined]  # noqa: F821
+    tracing = trace.shape[0] > 0
+    if tracing:
+        locate(world, trace[0, :located])  # type: ignore[name-defined]  # noqa: F821
+    steps = 0
+    status = RUNNING
+    while status == RUNNING:
+        observe(world, observation)  # type: ignore[name-defined]  # noqa: F821
+        if sensor_std > 0.0:
+            for i in range(observation.size):
+                observation[i] += noise_rng.normal(0.0, sensor_std)
+        activate(agent, memory, observation, action)  # type: ignore[name-defined]  # noqa: F821
+        status = step(world, action, world_rng, terms)  # type: ignore[name-defined]  # noqa: F821
+        for i in range(terms.size):
+            totals[i] += terms[i]
+        steps += 1
+        if tracing:
+            locate(world, trace[steps, :located])  # type: ignore[name-defined]  # noqa: F821
+            trace[steps, located:] = terms
+    return status, steps
+
+
+def episode_loop(simulation: Simulation, brain_type: type[Any], task: str) -> Callable[..., Any]:
+    """The loop for one kind of world and brain: compiled if the world is, else plain Python."""
+    functions = _BRAIN_FUNCTIONS[brain_type]
+    return _bind(
+        task,
+        brain_type.__name__,
+        simulation.reset,
+        simulation.observe,
+        simulation.step,
+        simulation.locate,
+        functions.fresh_memory,
+        functions.activate,
+        simulation.compiled,
+    )
+
+
+@functools.cache
+def _bind(  # type: ignore[no-untyped-def]
+    task: str, brain_name: str, reset, observe, step, locate, fresh_memory, activate, compile_it: bool
+) -> Callable[..., Any]:
+    loop = with_functions(
+        _episode,
+        f"episode_of_{task}_with_{brain_name}",
+        reset=reset,
+        observe=observe,
+        step=step,
+        locate=locate,
+        fresh_memory=fresh_memory,
+        activate=activate,
+    )
+    return compiled(loop) if compile_it else loop

@@ -1,0 +1,18 @@
+"""The story of a run: training, validation, test. Works from plain objects, without Hydra."""
+
+from exneat_cli.runs.progress import Bar, Lines, Progress, Silence, progress_for_terminal
+from exneat_cli.runs.run import Finished, train
+from exneat_cli.runs.scores import summary_sentence
+from exneat_cli.runs.settings import RunSettings
+
+__all__ = [
+    "Bar",
+    "Finished",
+    "Lines",
+    "Progress",
+    "RunSettings",
+    "Silence",
+    "progress_for_terminal",
+    "summary_sentence",
+    "train",
+]

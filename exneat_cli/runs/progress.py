@@ -1,0 +1,115 @@
+"""How a run tells what it is doing: a live bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from typing import Protocol, TextIO
+
+from exneat_cli.records import HistoryRow
+
+
+class Progress(Protocol):
+    """What a training loop calls."""
+
+    def start(self, title: str, generations: int) -> None:
+        """Training begins."""
+
+    def say(self, text: str) -> None:
+        """Something worth one line."""
+
+    def generation(self, row: HistoryRow) -> None:
+        """A generation is done."""
+
+    def stop(self) -> None:
+        """Training is over, whether it went well or not."""
+
+
+class Silence:
+    """No progress at all: the default from Python."""
+
+    def start(self, title: str, generations: int) -> None:
+        """Say nothing."""
+
+    def say(self, text: str) -> None:
+        """Say nothing."""
+
+    def generation(self, row: HistoryRow) -> None:
+        """Say nothing."""
+
+    def stop(self) -> None:
+        """Say nothing."""
+
+
+class Lines:
+    """About ten plain lines per run, for logs."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._title = ""
+        self._generations = 1
+
+    def start(self, title: str, generations: int) -> None:
+        """Remember the title for every line."""
+        self._title, self._generations = title, generations
+
+    def say(self, text: str) -> None:
+        """Print the line."""
+        print(f"{self._title}: {text}", file=self._stream, flush=True)
+
+    def generation(self, row: HistoryRow) -> None:
+        """Print every tenth part of the run, and the last generation."""
+        interval = max(1, self._generations // 10)
+        if row.generation % interval == 0 or row.generation == self._generations:
+            self.say(
+                f"generation {row.generation}/{self._generations}  {_figures(row)}"
+                f"  {row.wall_seconds / row.generation:.2f} s each"
+            )
+
+    def stop(self) -> None:
+        """Nothing to tidy up."""
+
+
+class Bar:
+    """A live bar with the figures of the last generation and the time left."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as RichProgress
+
+        self._bar = RichProgress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[figures]}"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
+
+    def start(self, title: str, generations: int) -> None:
+        """Show the empty bar."""
+        self._task = self._bar.add_task(title, total=generations, figures="")
+        self._bar.start()
+
+    def say(self, text: str) -> None:
+        """Print the line above the bar."""
+        self._bar.console.print(text, highlight=False)
+
+    def generation(self, row: HistoryRow) -> None:
+        """Move on by one."""
+        self._bar.update(self._task, completed=row.generation, figures=_figures(row))
+
+    def stop(self) -> None:
+        """Leave the bar as it is."""
+        self._bar.stop()
+
+
+def progress_for_terminal() -> Progress:
+    """A bar if standard error is a terminal, else lines on it."""
+    return Bar() if sys.stderr.isatty() else Lines(sys.stderr)
+
+
+def _figures(row: HistoryRow) -> str:
+    return f"best {row.best_fitness:.1f}  mean {row.mean_fitness:.1f}  best so far {row.best_so_far:.1f}"

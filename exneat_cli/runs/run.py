@@ -1,0 +1,206 @@
+"""One run from settings to a finished directory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from exneat_cli.brains import Brain, assemble, motionless
+from exneat_cli.evolution import Team
+from exneat_cli.records import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    RUNNING,
+    Champion,
+    HistoryRow,
+    RunDirectory,
+    provenance,
+    write_champion,
+    write_csv,
+    write_hall_of_fame,
+    write_history,
+    write_whole,
+)
+from exneat_cli.rollouts import Job, Runner
+from exneat_cli.runs.progress import Progress, Silence
+from exneat_cli.runs.scores import Score, random_jobs, score, score_brains, summary_sentence
+from exneat_cli.runs.settings import RunSettings
+from exneat_cli.runs.training import Trained, evolve
+from exneat_cli.seeding import STREAMS, shared_episodes
+
+MANIFEST_FORMAT = 1
+ROBUSTNESS_COLUMNS = (
+    "arm",
+    "run_seed",
+    "parameter",
+    "level",
+    "episodes",
+    "fitness_mean",
+    "fitness_std",
+    "full_reward_mean",
+    "full_reward_std",
+)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run that is done.
+
+    Attributes:
+        directory: where its files are.
+        result: test figures of champion, standing still and first generation; see the manifest.
+        summary: the same in one sentence.
+        trained_now: False if it was found finished.
+    """
+
+    directory: RunDirectory
+    result: dict[str, Any]
+    summary: str
+    trained_now: bool
+
+
+def train(settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = ()) -> Finished:
+    """Do one run, or find it done.
+
+    Args:
+        settings: see there.
+        progress: told what happens; nothing is shown without it.
+        command: the command line that asked for it, for the manifest.
+
+    Raises:
+        ExneatError: the directory is unusable or holds something else, or no team survived.
+    """
+    directory = settings.directory
+    if not directory.claim(settings.full_hash, resume=settings.resume):
+        result = directory.read_manifest()["result"]
+        return Finished(directory, result, summary_sentence(settings.task, result), trained_now=False)
+    _open_records(settings, command)
+    progress = progress or Silence()
+    try:
+        result = _do(settings, directory, progress)
+    except KeyboardInterrupt:
+        directory.update_manifest(status=INTERRUPTED)
+        raise
+    except BaseException as error:
+        directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+        raise
+    finally:
+        progress.stop()
+    directory.update_manifest(status=DONE, finished=_now(), result=result)
+    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=True)
+
+
+def _open_records(settings: RunSettings, command: Sequence[str]) -> None:
+    directory = settings.directory
+    directory.update_manifest(
+        format=MANIFEST_FORMAT,
+        status=RUNNING,
+        arm=settings.arm,
+        task=settings.task.name,
+        seed=settings.seed,
+        configuration_hash=settings.full_hash,
+        command=list(command),
+        started=_now(),
+        seeds={"root": settings.seed, "streams": STREAMS},
+        versions=provenance.versions(),
+        processor=provenance.processor(),
+        cores=os.cpu_count(),
+        git_commit=provenance.git_commit(),
+    )
+    write_whole(directory.config, yaml.safe_dump(settings.to_plain(), sort_keys=False))
+
+
+def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
+    progress.start(directory.path.name, settings.generations)
+    if settings.algorithm == "random":
+        return _test_random(settings, directory)
+
+    def report(history: list[HistoryRow]) -> None:
+        write_history(directory.history, history)
+        progress.generation(history[-1])
+
+    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
+        simulator = "compiled" if runner.compiled else "gymnasium"
+        directory.update_manifest(simulator=simulator)
+        if not runner.compiled:
+            progress.say("MuJoCo cannot be called from compiled code here: running over Gymnasium, which is slower")
+        trained = evolve(settings, runner, report)
+    last = trained.history[-1]
+    spent = {"episodes": last.episodes, "env_steps": last.env_steps, "wall_seconds": last.wall_seconds}
+    directory.update_manifest(budget_spent=spent)
+    progress.say(f"validating {len(trained.hall_of_fame)} teams of the hall of fame")
+    return _choose_champion(settings, directory, trained)
+
+
+def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Trained) -> dict[str, Any]:
+    entries = trained.hall_of_fame
+    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
+        brains = [_compile(settings, entry.team) for entry in entries]
+        validation = score_brains(runner, brains, "validation", settings.validation_episodes)
+        best = max(range(len(entries)), key=lambda k: validation[k].fitness_mean)
+        first = _compile(settings, trained.first_generation)
+        tested = score_brains(runner, [brains[best], _standing_still(settings), first], "test", settings.test_episodes)
+        trace = runner.trace(Job(brains[best], shared_episodes("test", 1)[0]))
+    scores = {
+        "training": {"fitness": entries[best].fitness, "generation": entries[best].generation + 1},
+        "validation": asdict(validation[best]),
+        "test": asdict(tested[0]),
+    }
+    write_hall_of_fame(directory.hall_of_fame, entries, [each.fitness_mean for each in validation])
+    write_champion(directory.champion, _champion(settings, entries[best].team, scores))
+    _write_trace(settings, directory, trace)
+    names = ("champion", "standing_still", "first_generation")
+    return {name: asdict(each) for name, each in zip(names, tested, strict=True)}
+
+
+def _test_random(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
+    jobs = random_jobs(settings.task, settings.seed, settings.test_episodes)
+    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
+        tested = score(runner.run(jobs))
+        (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
+        trace = runner.trace(random_jobs(settings.task, settings.seed, 1)[0])
+    _write_trace(settings, directory, trace)
+    write_csv(directory.robustness, ROBUSTNESS_COLUMNS, [_unperturbed(settings, tested)])
+    return {"champion": asdict(tested), "standing_still": asdict(standing)}
+
+
+def _unperturbed(settings: RunSettings, tested: Score) -> tuple[object, ...]:
+    figures = (tested.fitness_mean, tested.fitness_std, tested.full_reward_mean, tested.full_reward_std)
+    return (settings.arm, settings.seed, "none", 0.0, tested.episodes, *figures)
+
+
+def _compile(settings: RunSettings, team: Team) -> Brain:
+    return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
+
+
+def _standing_still(settings: RunSettings) -> Brain:
+    return motionless(settings.task.observation_size, len(settings.task.actuator_names))
+
+
+def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
+    return Champion(
+        arm=settings.arm,
+        task=settings.to_plain()["task"],
+        actuators=settings.task.actuator_names,
+        feed_forward=settings.evolution.feed_forward,
+        plan=settings.plan,
+        genomes=team.genomes,
+        scores=scores,
+    )
+
+
+def _write_trace(settings: RunSettings, directory: RunDirectory, trace: NDArray[np.float64]) -> None:
+    columns = ("step", *settings.task.trace_columns, *settings.task.terms)
+    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.tolist())])
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

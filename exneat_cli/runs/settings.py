@@ -1,0 +1,154 @@
+"""Everything that defines one run, as one frozen object that can be written down and read back."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole
+from exneat_cli.evolution import PAIRINGS, EvolutionSettings
+from exneat_cli.records import RunDirectory, configuration_hash
+from exneat_cli.rollouts import Executor, Noise
+from exneat_cli.tasks import TASKS, AntTask, Task
+from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_Part = TypeVar("_Part")
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """One training of one arm with one seed; the defaults are Ant's quick budget.
+
+    Attributes:
+        task: what is learned.
+        algorithm: ``exneat``, ``neat``, or ``random`` (no training, only the test).
+        geometry, linkage, wiring: how modules are wired.
+        noise: what disturbs the agent, in training, validation and test alike.
+        evolution: how genomes change and compete.
+        executor: where episodes run; without effect on results.
+        seed: root of all random streams but those of validation and test.
+        generations, population: of each subpopulation.
+        episodes: training episodes per team and generation.
+        pairing: ``rank`` or ``index``.
+        validation_episodes: per team of the hall of fame.
+        test_episodes: per brain that is tested.
+        name: directory below `output`; None takes the task's name.
+        output: root of all run directories.
+        resume: do an unfinished run again.
+
+    Raises:
+        ConfigError: a value is out of range, or the combination makes no sense.
+    """
+
+    task: Task = field(default_factory=AntTask)
+    algorithm: str = "exneat"
+    geometry: Geometry = field(default_factory=Geometry)
+    linkage: str = "none"
+    wiring: Wiring = field(default_factory=Wiring)
+    noise: Noise = field(default_factory=Noise)
+    evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
+    executor: Executor = field(default_factory=Executor)
+    seed: int = 0
+    generations: int = 40
+    population: int = 100
+    episodes: int = 1
+    pairing: str = "rank"
+    validation_episodes: int = 10
+    test_episodes: int = 20
+    name: str | None = None
+    output: str = "outputs"
+    resume: bool = False
+
+    def __post_init__(self) -> None:
+        check_whole("seed", self.seed, 0)
+        check_whole("generations", self.generations, 1)
+        check_whole("population", self.population, 2, 1_000_000)
+        check_whole("episodes", self.episodes, 1)
+        check_choice("pairing", self.pairing, PAIRINGS)
+        check_whole("validation_episodes", self.validation_episodes, 1)
+        check_whole("test_episodes", self.test_episodes, 1)
+        check_flag("resume", self.resume)
+        if not isinstance(self.output, str) or not self.output or "\0" in self.output:
+            raise ConfigError("output", "a directory", self.output)
+        if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
+            mend = "run directories stay below output=; set that to write elsewhere"
+            raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, mend)
+        _ = self.plan
+
+    @property
+    def plan(self) -> Plan:
+        """Who senses and drives what."""
+        hidden = self.evolution.neat_hidden if self.algorithm == "neat" else self.evolution.module_hidden
+        return plan_wiring(self.task, self.algorithm, self.geometry, self.linkage, self.wiring, hidden=hidden)
+
+    @property
+    def arm(self) -> str:
+        """What is compared, in one word, e.g. ``exneat-all-none`` or ``neat``."""
+        if self.algorithm != "exneat":
+            return self.algorithm
+        geometry = self.geometry.name + "".join(str(entry) for entry in self.geometry.vector or ())
+        decentral = self.task.trunk is not None and self.wiring.central is False
+        return f"exneat-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
+
+    @property
+    def directory(self) -> RunDirectory:
+        """Where the run keeps its files: ``<output>/<name>/<arm>-s<seed>-<hash>``."""
+        short = configuration_hash(self.to_plain(), with_seed=False)[:6]
+        return RunDirectory(Path(self.output) / (self.name or self.task.name) / f"{self.arm}-s{self.seed}-{short}")
+
+    @property
+    def full_hash(self) -> str:
+        """Hash of everything that results depend on."""
+        return configuration_hash(self.to_plain())
+
+    def to_plain(self) -> dict[str, Any]:
+        """The settings as dicts, lists, numbers and strings; `from_plain` reads them back."""
+        plain: dict[str, Any] = asdict(self)
+        vector = self.geometry.vector
+        plain["geometry"]["vector"] = None if vector is None else list(vector)
+        return plain
+
+    @classmethod
+    def from_plain(cls, plain: Mapping[str, Any]) -> RunSettings:
+        """Settings from plain data, such as a composed configuration or a run's config.yaml.
+
+        Raises:
+            ConfigError: a key is unknown, or a value has the wrong type or range.
+        """
+        parts: dict[str, type[Any]] = {
+            "geometry": Geometry,
+            "wiring": Wiring,
+            "noise": Noise,
+            "evolution": EvolutionSettings,
+            "executor": Executor,
+        }
+        task = _section("task", plain.get("task", {}))
+        check_choice("task.name", task.get("name"), list(TASKS))
+        values: dict[str, Any] = dict(plain)
+        values["task"] = _build(TASKS[task["name"]], task, "task.")
+        for key, part in parts.items():
+            if key in values:
+                values[key] = _build(part, _section(key, values[key]), f"{key}.")
+        return _build(cls, values, "")
+
+
+def _section(key: str, value: object) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(key, "a section with keys of its own", value)
+    return value
+
+
+def _build(part: type[_Part], values: Mapping[str, Any], prefix: str) -> _Part:
+    known = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
+    for key in values:
+        if key not in known:
+            close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
+            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
+            raise ExneatError(f"{prefix}{key}: unknown key (value {values[key]!r})\n  {hint}")
+    return part(**values)

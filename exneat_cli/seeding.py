@@ -1,0 +1,69 @@
+"""Named random streams, all grown from one root seed.
+
+Each purpose has a number of its own in the spawn key of a `numpy.random.SeedSequence`, so streams of
+different purposes never meet, and a new purpose leaves the others as they are. Validation and test
+episodes grow from a constant instead of the run's seed: every run and every arm faces the same ones.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numpy.random import PCG64, Generator, SeedSequence
+
+STREAMS = {
+    "evolution": 0,
+    "pairing": 1,
+    "world": 2,
+    "sensor_noise": 3,
+    "action_ties": 4,
+    "validation": 5,
+    "test": 6,
+    "random_actions": 7,
+}
+"""Purpose -> first entry of the spawn key. Numbers are never reused: results depend on them."""
+
+SHARED_ROOT = 0
+"""Root of the validation and test streams, which do not depend on the run's seed."""
+
+
+class EpisodeSeeds(NamedTuple):
+    """What makes one episode: the world that is drawn, and the noise on the sensors in it."""
+
+    world: SeedSequence
+    sensor_noise: SeedSequence
+
+
+def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
+    """Seed of one stream.
+
+    Args:
+        root: the run's seed, at least 0.
+        purpose: a key of `STREAMS`.
+        indices: which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
+
+    Raises:
+        KeyError: `purpose` is not a stream.
+    """
+    return SeedSequence(root, spawn_key=(STREAMS[purpose], *indices))
+
+
+def generator(seed: SeedSequence) -> Generator:
+    """A PCG64 generator at the start of `seed`'s stream, the kind that Gymnasium uses."""
+    return Generator(PCG64(seed))
+
+
+def training_episodes(root: int, generation: int, count: int) -> list[EpisodeSeeds]:
+    """The `count` episodes that every team of one generation (counted from 0) faces."""
+    return [
+        EpisodeSeeds(stream(root, "world", generation, episode), stream(root, "sensor_noise", generation, episode))
+        for episode in range(count)
+    ]
+
+
+def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
+    """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and arms."""
+    return [
+        EpisodeSeeds(stream(SHARED_ROOT, purpose, episode, 0), stream(SHARED_ROOT, purpose, episode, 1))
+        for episode in range(count)
+    ]

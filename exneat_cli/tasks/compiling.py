@@ -1,0 +1,67 @@
+"""Compiling with numba: no GIL, cached between processes, never stale.
+
+numba's own cache forgets a function only when the file that holds it changes; a compiled episode,
+however, carries everything that it calls. So the cache directory is named after the contents of
+every file that is compiled together.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import types
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import config
+
+_COMPILED_ROOMS = ("tasks", "brains", "rollouts")
+
+
+@functools.cache
+def cache_directory() -> Path | None:
+    """Where compiled code is kept, or None where nothing can be written.
+
+    Below ``NUMBA_CACHE_DIR`` if that is set, else ``$XDG_CACHE_HOME/exneat``, else ``~/.cache/exneat``.
+    """
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256(version("numpy").encode())
+    for room in _COMPILED_ROOMS:
+        for path in sorted((package / room).glob("*.py")):
+            digest.update(path.read_bytes())
+    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "exneat"
+    directory = Path(os.environ.get("NUMBA_CACHE_DIR") or default) / digest.hexdigest()[:16]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return directory if os.access(directory, os.W_OK) else None
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile `function` on its first call: releases the GIL, divides like NumPy, cached if possible."""
+    directory = cache_directory()
+    before = config.CACHE_DIR  # type: ignore[attr-defined]
+    config.CACHE_DIR = "" if directory is None else str(directory)  # type: ignore[attr-defined]
+    try:
+        return numba.njit(nogil=True, cache=directory is not None, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+
+def with_functions(template: Callable[..., Any], name: str, **functions: Callable[..., Any]) -> types.FunctionType:
+    """A copy of `template` in which the global names in `functions` mean those functions.
+
+    This is how one episode loop serves every task: numba caches functions that call compiled globals,
+    but not functions that take them as arguments or close over them. `name` must differ between
+    copies, since the cache tells them apart by it.
+    """
+    copy = types.FunctionType(template.__code__, {**template.__globals__, **functions}, name)
+    copy.__qualname__ = name
+    copy.__module__ = template.__module__
+    copy.__doc__ = template.__doc__
+    return copy

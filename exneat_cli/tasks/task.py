@@ -1,0 +1,107 @@
+"""What every task offers to the other rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+RUNNING = 0
+"""The episode goes on."""
+ENDED = 1
+"""The episode is over in an ordinary way: solved, fallen, stuck or out of time."""
+FAILED = 2
+"""The simulation exploded or a value was not finite; nothing that it gave counts."""
+
+
+@dataclass(frozen=True)
+class Sector:
+    """A place of the body with its own sensors, and maybe its own actuators.
+
+    Attributes:
+        name: unique within the task, e.g. ``front_left``; named geometries go by it.
+        sensors: entries of the observation that this place senses.
+        actuators: entries of the action that move this place.
+        position: (x, y) of the place seen from the trunk, x ahead and y to the left, in the task's
+            length unit.
+    """
+
+    name: str
+    sensors: tuple[int, ...]
+    actuators: tuple[int, ...]
+    position: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """One world and the four functions that run episodes in it; use it from one thread at a time.
+
+    The functions are compiled ones that take `world` as a tuple of arrays, or plain Python ones.
+
+    Attributes:
+        world: the storage, first argument of all four.
+        reset: ``reset(world, rng)`` draws a new world from a NumPy Generator.
+        observe: ``observe(world, observation)`` writes the noiseless observation.
+        step: ``step(world, action, rng, terms)`` acts once, writes this step's reward terms and returns
+            `RUNNING`, `ENDED` or `FAILED`.
+        locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`.
+        compiled: whether the functions are compiled.
+        owner: keeps alive what `world` only points to.
+    """
+
+    world: Any
+    reset: Callable[..., Any]
+    observe: Callable[..., Any]
+    step: Callable[..., Any]
+    locate: Callable[..., Any]
+    compiled: bool
+    owner: object = None
+
+
+class Task(Protocol):
+    """A task's parameters, and what follows from them."""
+
+    terms: ClassVar[tuple[str, ...]]
+    """Names of the reward terms that `Simulation.step` writes."""
+    trace_columns: ClassVar[tuple[str, ...]]
+    """Names of what `Simulation.locate` writes."""
+    fitness_name: ClassVar[str]
+    """What the fitness is, in words, for sentences and axes."""
+    failure_floor: ClassVar[float]
+    """Fitness of an episode that failed."""
+
+    @property
+    def name(self) -> str:
+        """The task's name in `conf/task` and in run directories."""
+
+    @property
+    def sectors(self) -> tuple[Sector, ...]:
+        """The places of the body, in the order that a geometry vector indexes."""
+
+    @property
+    def trunk(self) -> Sector | None:
+        """What belongs to no sector, for a central module; None if there is no such thing."""
+
+    @property
+    def observation_size(self) -> int:
+        """Length of the observation."""
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """One name per entry of the action."""
+
+    @property
+    def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest sensible action, one entry per actuator."""
+
+    def open(self, *, training: bool, reset_scale: float) -> Simulation:
+        """A new world; `training` switches on what belongs to training only, such as early stopping."""
+
+    def fitness(self, totals: NDArray[np.float64]) -> float:
+        """Fitness of an episode whose terms add up to `totals`."""
+
+    def full_reward(self, totals: NDArray[np.float64]) -> float:
+        """The second figure that tests report; equals the fitness where a task has only one."""

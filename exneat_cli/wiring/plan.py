@@ -1,0 +1,95 @@
+"""The wiring plan: which pins every module has, and what it drives.
+
+A plan is plain data. Modules come in the order of the task's sectors, the central module last; pins
+come in the order in which genomes see them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+CENTRAL = "central"
+"""Name of the central module."""
+
+
+@dataclass(frozen=True)
+class Pin:
+    """One input of a module.
+
+    Attributes:
+        kind: ``sensor`` (entry of the observation), ``output`` (of a module) or ``hidden`` (initial
+            hidden node of a module).
+        index: which entry, output or hidden node, counted from 0.
+        module: index of the module that is read; -1 for a sensor.
+        delayed: whether the value of the previous step is read, 0 at the first; links are delayed, the
+            central module's view of its encoders is not.
+    """
+
+    kind: str
+    index: int
+    module: int = -1
+    delayed: bool = False
+
+
+@dataclass(frozen=True)
+class Module:
+    """One network of the brain, as wired.
+
+    Attributes:
+        name: the sector's name, ``central``, or ``body`` for NEAT's only module.
+        position: (x, y) seen from the trunk, x ahead and y left.
+        subpopulation: which subpopulation its genomes come from.
+        pins: its inputs.
+        outputs: number of output nodes.
+        hidden: number of initial hidden nodes.
+        drives: entries of the action that its outputs set, in order; empty for an encoder.
+    """
+
+    name: str
+    position: tuple[float, float]
+    subpopulation: int
+    pins: tuple[Pin, ...]
+    outputs: int
+    hidden: int
+    drives: tuple[int, ...]
+
+    @property
+    def sensors(self) -> tuple[int, ...]:
+        """Entries of the observation that it senses itself."""
+        return tuple(pin.index for pin in self.pins if pin.kind == "sensor")
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Numbers of inputs, initial hidden nodes and outputs; sharers of genomes agree on it."""
+        return len(self.pins), self.hidden, self.outputs
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A whole brain, as wired.
+
+    Attributes:
+        modules: sector modules in the task's order, then the central module if there is one.
+        observation_size: length of the observation.
+        action_size: length of the action.
+    """
+
+    modules: tuple[Module, ...]
+    observation_size: int
+    action_size: int
+
+    @property
+    def subpopulation_shapes(self) -> tuple[tuple[int, int, int], ...]:
+        """(inputs, hidden, outputs) of the genomes of each subpopulation."""
+        shapes = {module.subpopulation: module.shape for module in self.modules}
+        return tuple(shapes[index] for index in range(len(shapes)))
+
+    def hidden_is_linked(self, module: int) -> bool:
+        """Whether another module reads hidden nodes of `module`."""
+        return any(pin.kind == "hidden" and pin.module == module for m in self.modules for pin in m.pins)
+
+
+def sensor_pins(indices: Sequence[int]) -> tuple[Pin, ...]:
+    """One pin per entry of the observation."""
+    return tuple(Pin("sensor", index) for index in indices)
