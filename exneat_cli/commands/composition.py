@@ -1,20 +1,19 @@
-"""Hydra: composing a configuration from conf/ and the command line, and reading its complaints."""
+"""Hydra: composing a configuration from conf/ and the command line, and putting its complaints in our words."""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import hydra
-import yaml
-from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 import exneat_cli
-from exneat_cli.errors import ExneatError
+from exneat_cli.errors import ExneatError, check_choice
 from exneat_cli.runs import RunSettings
 
 # Hydra would otherwise make a directory of its own per run, write its files into it and open a log there.
@@ -26,10 +25,10 @@ _HYDRA_OVERRIDES = (
     "hydra.sweep.dir=${output}/.multirun",
     "hydra.sweep.subdir=.",
 )
-_FLAGS = {
-    *("--help", "-h", "--hydra-help", "--version", "--cfg", "-c", "--resolve", "--package", "-p"),
-    *("--run", "-r", "--multirun", "-m", "--info", "-i", "--shell-completion", "-sc"),
+_FLAGS = {"--help", "-h", "--hydra-help", "--version", "--resolve", "--run", "-r", "--multirun", "-m"}
+_FLAGS_WITH_VALUE = {
     *("--config-path", "-cp", "--config-name", "-cn", "--config-dir", "-cd"),
+    *("--package", "-p", "--cfg", "-c", "--shell-completion", "-sc"),
 }
 _LONGEST_LINE = 300
 
@@ -46,22 +45,31 @@ def run_composed(program: str, arguments: Sequence[str], job: Callable[[DictConf
 
     Args:
         program: what Hydra calls the program in its help, e.g. ``exneat train``.
-        arguments: overrides and Hydra's flags.
-        job: called once per combination.
+        arguments: overrides and Hydra's flags, in any order.
+        job: called once per combination; what it raises in a multirun stops only that combination.
 
     Raises:
-        ExneatError: the configuration cannot be composed, or a job raised it.
+        ExneatError: the configuration cannot be composed.
     """
-    for argument in arguments:
-        if argument.startswith("-") and argument.split("=")[0] not in _FLAGS:
-            raise ExneatError(f"{argument}: unknown flag; settings are written key=value, see {program} --help")
+    raised: list[BaseException] = []
+
+    def guarded(config: DictConfig) -> None:
+        try:
+            job(config)
+        except BaseException as error:
+            raised.append(error)
+            raise
+
     os.environ["HYDRA_FULL_ERROR"] = "1"
-    sys.argv = [program, *_HYDRA_OVERRIDES, *arguments]
+    flags, overrides = _flags_first(program, arguments)
+    sys.argv = [program, *flags, *_HYDRA_OVERRIDES, *overrides]
     directory = str(configuration_directory())
     try:
-        hydra.main(version_base="1.3", config_path=directory, config_name="config")(job)()
-    except (HydraException, OmegaConfBaseException, yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise ExneatError(_in_few_lines(error)) from error
+        hydra.main(version_base="1.3", config_path=directory, config_name="config")(guarded)()
+    except Exception as error:
+        if error in raised:
+            raise
+        raise ExneatError(_in_our_words(error)) from error
 
 
 def settings_from(config: DictConfig) -> RunSettings:
@@ -73,20 +81,48 @@ def settings_from(config: DictConfig) -> RunSettings:
     try:
         plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     except OmegaConfBaseException as error:
-        raise ExneatError(_in_few_lines(error)) from error
+        raise ExneatError(_in_our_words(error)) from error
     assert isinstance(plain, dict)
     settled = {str(key): value for key, value in plain.items() if key not in ("budget", "budgets")}
     return RunSettings.from_plain(settled)
 
 
-def _in_few_lines(error: BaseException) -> str:
-    """At most three lines: what Hydra, OmegaConf, YAML or the system says, without its explanations."""
-    text = str(error)
-    cause = error.__cause__
-    if cause is not None and str(cause) not in text:
-        text = f"{text}\n{cause}"
+def _flags_first(program: str, arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Flags and overrides apart: argparse refuses overrides on both sides of a flag."""
+    flags: list[str] = []
+    overrides: list[str] = []
+    waiting = iter(arguments)
+    for argument in waiting:
+        name, separator, _ = argument.partition("=")
+        if not argument.startswith("-"):
+            overrides.append(argument)
+        elif name in _FLAGS and not separator:
+            flags.append(argument)
+        elif name in _FLAGS_WITH_VALUE:
+            value = [] if separator else [next(waiting, "")]
+            if name in ("--cfg", "-c"):
+                check_choice(name, argument.partition("=")[2] if separator else value[0], ("job", "hydra", "all"))
+            if value == [""]:
+                raise ExneatError(f"{argument}: expected a value after it, got nothing")
+            flags += [argument, *value]
+        else:
+            raise ExneatError(f"{argument}: unknown flag; settings are written key=value, see {program} --help")
+    return flags, overrides
+
+
+def _in_our_words(error: Exception) -> str:
+    text = str(error) or type(error).__name__
+    if unknown := re.match(r"Could not override '(.+?)'", text):
+        return f"{unknown[1]}: unknown key; exneat train --help lists all of them"
+    if unknown := re.search(r"Could not find '(.+)/(.+?)'", text):
+        options = re.search(r"Available options in '.+':\n((?:\t.+\n?)+)", text)
+        known = ", ".join(options[1].split()) if options else "none"
+        return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
+    if dangling := re.search(r"Interpolation key '(.+?)' not found\s+full_key: (\S+)", text):
+        return f"{dangling[2]}: refers to {dangling[1]}, which no configuration file and no override sets"
     if isinstance(error, UnicodeDecodeError):
-        text = f"a configuration file is not UTF-8 text: {error}"
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
+        return f"a configuration file is not UTF-8 text: {text}"
+    cause = error.__cause__
+    lines = [line.strip() for line in f"{text}\n{cause or ''}".splitlines() if line.strip()]
     kept = [lines[0], " ".join(lines[1:])] if len(lines) > 3 else lines
     return "\n  ".join(line[:_LONGEST_LINE] for line in kept)

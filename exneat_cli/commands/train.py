@@ -11,38 +11,35 @@ from omegaconf import DictConfig
 
 from exneat_cli.commands.composition import run_composed, settings_from
 from exneat_cli.errors import ExneatError
+from exneat_cli.runs import progress_for_terminal, train
 
 
 def run(arguments: Sequence[str]) -> int:
     """Train; returns the exit code.
 
     Raises:
-        ExneatError: the configuration or a run directory is unusable.
+        ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
-    failures: list[str] = []
+    refused: list[ExneatError] = []
 
     def job(config: DictConfig) -> None:
-        if HydraConfig.get().mode is not RunMode.MULTIRUN:
-            _train(config, arguments)
-            return
         try:
             _train(config, arguments)
         except ExneatError as error:
-            overrides = " ".join(HydraConfig.get().overrides.task)
-            failures.append(overrides)
-            print(f"exneat: {overrides}: {error}", file=sys.stderr)
+            if HydraConfig.get().mode is RunMode.MULTIRUN:
+                # Raised again at the end of the multirun by Hydra, also where jobs run in other processes.
+                print(f"exneat: {' '.join(HydraConfig.get().overrides.task)}: {error}", file=sys.stderr)
+                raise ExneatError("at least one job of the multirun failed; see above") from error
+            refused.append(error)
 
     run_composed("exneat train", arguments, job)
-    if failures:
-        print(f"exneat: {len(failures)} of the jobs failed: {'; '.join(failures)}", file=sys.stderr)
-        return 2
+    if refused:
+        raise refused[0]
     return 0
 
 
 def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     settings = settings_from(config)
-    from exneat_cli.runs import progress_for_terminal, train
-
     finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])
     directory = finished.directory
     if not finished.trained_now:

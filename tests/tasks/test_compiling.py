@@ -1,0 +1,61 @@
+"""The compile cache and the copies of the episode template."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.tasks.compiling import cache_directory, compiled, with_functions
+
+
+def double(x: float) -> float:
+    return 2.0 * x
+
+
+def negate(x: float) -> float:
+    return -x
+
+
+def template(x: float) -> float:
+    return inner(x) + 1.0  # type: ignore[name-defined,no-any-return]  # noqa: F821
+
+
+def test_copies_of_a_template_call_the_functions_they_were_given() -> None:
+    doubling = compiled(with_functions(template, "doubling", inner=compiled(double)))
+    negating = compiled(with_functions(template, "negating", inner=compiled(negate)))
+    assert (doubling(3.0), negating(3.0)) == (7.0, -2.0)
+    assert with_functions(template, "plain", inner=double)(3.0) == 7.0
+
+
+def in_new_process(code: str, cache: Path) -> str:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    return done.stdout.strip()
+
+
+def test_a_second_process_finds_compiled_code_in_the_cache(tmp_path: Path) -> None:
+    code = (
+        "import numpy as np\n"
+        "from exneat_cli.brains.brain import fresh_memory\n"
+        "from exneat_cli.brains import motionless\n"
+        "fresh_memory(motionless(3, 2))\n"
+        "print(sum(fresh_memory.stats.cache_hits.values()), sum(fresh_memory.stats.cache_misses.values()))"
+    )
+    assert in_new_process(code, tmp_path) == "0 1"
+    assert in_new_process(code, tmp_path) == "1 0"
+
+
+def test_an_unusable_cache_directory_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocked = tmp_path / "file"
+    blocked.touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
+    cache_directory.cache_clear()
+    try:
+        assert cache_directory() is None
+        assert compiled(double)(4.0) == 8.0
+    finally:
+        cache_directory.cache_clear()

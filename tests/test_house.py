@@ -1,0 +1,112 @@
+"""The floors and fences of the house, read off the imports."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import exneat_cli
+
+PACKAGE = Path(exneat_cli.__file__).parent
+ROOMS = ["tasks", "wiring", "evolution", "brains", "rollouts", "records", "runs", "analysis", "commands", "main"]
+FREE = {"errors", "seeding"}
+FENCES = {
+    "hydra": {"main", "commands"},
+    "omegaconf": {"main", "commands"},
+    "gymnasium": {"tasks"},
+    "mujoco": {"tasks"},
+    "neat": {"evolution", "brains"},
+    "matplotlib": {"analysis"},
+    "dask": {"rollouts"},
+}
+
+
+def imports_of(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: expected absolute imports"
+            yield str(node.module)
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def modules() -> list[tuple[str, Path]]:
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        room = path.relative_to(PACKAGE).with_suffix("").parts[0]
+        if room not in ("__init__", *FREE):
+            found.append((room, path))
+    return found
+
+
+def test_every_file_stands_in_a_room() -> None:
+    strangers = {room for room, _ in modules()} - set(ROOMS)
+    assert not strangers
+
+
+def test_imports_never_climb_to_a_later_room() -> None:
+    wrong = []
+    for room, path in modules():
+        for name in imports_of(path):
+            parts = name.split(".")
+            if parts[0] != "exneat_cli" or len(parts) == 1:
+                continue
+            target = parts[1]
+            if target in ROOMS and ROOMS.index(target) > ROOMS.index(room):
+                wrong.append(f"{path.relative_to(PACKAGE)} imports {name}")
+    assert not wrong
+
+
+def test_runs_and_analysis_do_not_know_each_other() -> None:
+    wrong = [
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for room, path in modules()
+        if room in ("analysis", "runs")
+        for name in imports_of(path)
+        if name.startswith("exneat_cli.runs" if room == "analysis" else "exneat_cli.analysis")
+    ]
+    assert not wrong
+
+
+def test_analysis_never_touches_genomes_or_simulators() -> None:
+    forbidden = tuple(f"exneat_cli.{room}" for room in ("tasks", "evolution", "brains", "rollouts"))
+    wrong = [name for room, path in modules() if room == "analysis" for name in imports_of(path)]
+    assert not [name for name in wrong if name.startswith(forbidden)]
+
+
+def test_what_every_room_may_import_imports_no_room() -> None:
+    for name in FREE:
+        assert not [i for i in imports_of(PACKAGE / f"{name}.py") if i.startswith("exneat_cli")]
+
+
+def test_libraries_stay_behind_their_fences() -> None:
+    wrong = []
+    for room, path in modules():
+        for name in imports_of(path):
+            library = name.split(".")[0]
+            if room not in FENCES.get(library, {room}):
+                wrong.append(f"{path.relative_to(PACKAGE)} imports {library}")
+    assert not wrong
+
+
+def test_every_public_definition_has_a_docstring() -> None:
+    bare = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if (
+                isinstance(node, ast.FunctionDef | ast.ClassDef)
+                and not node.name.startswith("_")
+                and not ast.get_docstring(node)
+            ):
+                bare.append(f"{path.relative_to(PACKAGE)}: {node.name}")
+    # Functions within functions are nobody's interface.
+    assert set(bare) <= {
+        "commands/train.py: job",
+        "commands/composition.py: guarded",
+        "runs/run.py: report",
+        "runs/scores.py: act_at_random",
+        "wiring/linkage.py: angle",
+        "brains/assembly.py: pin_slots",
+    }
