@@ -28,10 +28,11 @@ SHARED_ROOT = 0
 
 
 class EpisodeSeeds(NamedTuple):
-    """What makes one episode: the world that is drawn, and the noise on the sensors in it."""
+    """What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
 
     world: SeedSequence
     sensor_noise: SeedSequence
+    actions: SeedSequence
 
 
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
@@ -56,7 +57,11 @@ def generator(seed: SeedSequence) -> Generator:
 def training_episodes(root: int, generation: int, count: int) -> list[EpisodeSeeds]:
     """The `count` episodes that every team of one generation (counted from 0) faces."""
     return [
-        EpisodeSeeds(stream(root, "world", generation, episode), stream(root, "sensor_noise", generation, episode))
+        EpisodeSeeds(
+            world=stream(root, "world", generation, episode),
+            sensor_noise=stream(root, "sensor_noise", generation, episode),
+            actions=stream(root, "action_ties", generation, episode),
+        )
         for episode in range(count)
     ]
 
@@ -64,6 +69,6 @@ def training_episodes(root: int, generation: int, count: int) -> list[EpisodeSee
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
     """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and arms."""
     return [
-        EpisodeSeeds(stream(SHARED_ROOT, purpose, episode, 0), stream(SHARED_ROOT, purpose, episode, 1))
+        EpisodeSeeds(*(stream(SHARED_ROOT, purpose, episode, kind) for kind in range(len(EpisodeSeeds._fields))))
         for episode in range(count)
     ]

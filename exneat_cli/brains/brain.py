@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.tasks.compiling import compiled
@@ -76,7 +77,11 @@ def fresh_memory(brain: Brain) -> NDArray[np.float64]:
 
 @compiled
 def activate(
-    brain: Brain, memory: NDArray[np.float64], observation: NDArray[np.float64], action: NDArray[np.float64]
+    brain: Brain,
+    memory: NDArray[np.float64],
+    observation: NDArray[np.float64],
+    action: NDArray[np.float64],
+    rng: Generator,
 ) -> None:
     """One step: read `observation`, advance `memory`, write `action`.
 
@@ -85,6 +90,7 @@ def activate(
         memory: what `fresh_memory` gave, carried through the episode.
         observation: (observation size,).
         action: (A,), overwritten.
+        rng: what chance in the choice of actions draws from; networks leave nothing to chance.
     """
     for i in range(observation.size):
         memory[i] = observation[i]

@@ -12,11 +12,10 @@ from exneat_cli.tasks.compiling import compiled
 
 
 class RandomActions(NamedTuple):
-    """Bounds of the action, (A,) each, and the generator that draws it; one per episode."""
+    """Bounds of the action, (A,) each."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    rng: Generator
 
 
 @compiled
@@ -31,7 +30,8 @@ def activate(
     memory: NDArray[np.float64],
     observation: NDArray[np.float64],
     action: NDArray[np.float64],
+    rng: Generator,
 ) -> None:
     """Overwrite `action`, (A,), with a fresh draw."""
     for i in range(action.size):
-        action[i] = brain.rng.uniform(brain.low[i], brain.high[i])
+        action[i] = rng.uniform(brain.low[i], brain.high[i])

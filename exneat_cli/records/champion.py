@@ -127,4 +127,6 @@ def _plan_from_data(data: dict[str, Any]) -> Plan:
         )
         for module in data["modules"]
     )
-    return Plan(modules, data["observation_size"], data["action_size"])
+    plan = Plan(modules, data["observation_size"], data["action_size"])
+    plan.check()
+    return plan

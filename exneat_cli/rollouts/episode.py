@@ -22,6 +22,7 @@ def _episode(  # type: ignore[no-untyped-def]
     agent,
     world_rng: Generator,
     noise_rng: Generator,
+    action_rng: Generator,
     sensor_std: float,
     observation: NDArray[np.float64],
     action: NDArray[np.float64],
@@ -38,19 +39,19 @@ def _episode(  # type: ignore[no-untyped-def]
         agent: a brain.
         world_rng: draws the world.
         noise_rng: draws the sensor noise, in the order of the inputs.
+        action_rng: draws what the agent leaves to chance.
         sensor_std: sd of that noise; 0 draws nothing.
         observation: buffer, (observation size,).
         action: buffer, (action size,).
         totals: (terms,), overwritten with the sums of the reward terms.
-        trace: (at least the longest episode + 1, located + terms) to record the path, or no rows.
+        trace: (steps + 1, located + terms) to record the path; rows that it lacks are left out.
         located: how many columns of `trace` say where the agent is; the terms follow.
     """
     terms = np.zeros(totals.size)
     totals[:] = 0.0
     reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
     memory = fresh_memory(agent)  # type: ignore[name-defined]  # noqa: F821
-    tracing = trace.shape[0] > 0
-    if tracing:
+    if trace.shape[0] > 0:
         locate(world, trace[0, :located])  # type: ignore[name-defined]  # noqa: F821
     steps = 0
     status = RUNNING
@@ -59,12 +60,12 @@ def _episode(  # type: ignore[no-untyped-def]
         if sensor_std > 0.0:
             for i in range(observation.size):
                 observation[i] += noise_rng.normal(0.0, sensor_std)
-        activate(agent, memory, observation, action)  # type: ignore[name-defined]  # noqa: F821
+        activate(agent, memory, observation, action, action_rng)  # type: ignore[name-defined]  # noqa: F821
         status = step(world, action, world_rng, terms)  # type: ignore[name-defined]  # noqa: F821
         for i in range(terms.size):
             totals[i] += terms[i]
         steps += 1
-        if tracing:
+        if steps < trace.shape[0]:
             locate(world, trace[steps, :located])  # type: ignore[name-defined]  # noqa: F821
             trace[steps, located:] = terms
     return status, steps

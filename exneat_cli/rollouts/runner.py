@@ -7,11 +7,11 @@ the number of workers nor on which of them ran what.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from queue import SimpleQueue
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,10 +90,12 @@ class Runner:
         self._task = task
         self._noise = noise
         self._idle: SimpleQueue[Simulation] = SimpleQueue()
+        self._loops: dict[type[Any], Callable[..., Any]] = {}
         self._pool = ThreadPoolExecutor(executor.threads, thread_name_prefix="episodes")
         for _ in range(executor.threads):
             simulation = task.open(training=training, reset_scale=noise.reset_scale)
             self._idle.put(simulation)
+        self._any_simulation = simulation
         self.compiled = simulation.compiled
 
     def __enter__(self) -> Runner:
@@ -104,6 +106,7 @@ class Runner:
 
     def run(self, jobs: Sequence[Job]) -> list[Outcome]:
         """Outcomes in the order of the jobs."""
+        self._prepare(jobs)
         return list(self._pool.map(self._run_one, jobs))
 
     def trace(self, job: Job) -> NDArray[np.float64]:
@@ -113,10 +116,16 @@ class Runner:
             (steps + 1, columns): row t holds where the agent is after t steps (`Task.trace_columns`), then
             the reward terms of step t (`Task.terms`; 0 in the first row).
         """
+        self._prepare([job])
         columns = len(self._task.trace_columns) + len(self._task.terms)
         trace = np.zeros((self._run_one(job).steps + 1, columns))
         self._run_one(job, trace)
         return trace
+
+    def _prepare(self, jobs: Sequence[Job]) -> None:
+        """Bind the loops here, in one thread: while numba sets up its cache, others must not."""
+        for brain_type in {type(job.brain) for job in jobs} - set(self._loops):
+            self._loops[brain_type] = episode_loop(self._any_simulation, brain_type, self._task.name)
 
     def _run_one(self, job: Job, trace: NDArray[np.float64] | None = None) -> Outcome:
         task = self._task
@@ -125,11 +134,12 @@ class Runner:
             trace = np.zeros((0, len(task.trace_columns) + len(task.terms)))
         simulation = self._idle.get()
         try:
-            status, steps = episode_loop(simulation, type(job.brain), task.name)(
+            status, steps = self._loops[type(job.brain)](
                 simulation.world,
                 job.brain,
                 generator(job.seeds.world),
                 generator(job.seeds.sensor_noise),
+                generator(job.seeds.actions),
                 float(self._noise.sensor_std),
                 np.zeros(task.observation_size),
                 np.zeros(len(task.actuator_names)),

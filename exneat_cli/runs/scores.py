@@ -10,7 +10,7 @@ import numpy as np
 
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.rollouts import Job, Outcome, Runner
-from exneat_cli.seeding import EpisodeSeeds, generator, shared_episodes, stream
+from exneat_cli.seeding import shared_episodes, stream
 from exneat_cli.tasks import Task
 
 
@@ -56,12 +56,11 @@ def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes
 
 def random_jobs(task: Task, root: int, episodes: int) -> list[Job]:
     """The test episodes with actions drawn at random from the run's own stream."""
-    low, high = task.action_bounds
-
-    def act_at_random(episode: int, seeds: EpisodeSeeds) -> Job:
-        return Job(RandomActions(low, high, generator(stream(root, "random_actions", episode))), seeds)
-
-    return [act_at_random(episode, seeds) for episode, seeds in enumerate(shared_episodes("test", episodes))]
+    brain = RandomActions(*task.action_bounds)
+    return [
+        Job(brain, seeds._replace(actions=stream(root, "random_actions", episode)))
+        for episode, seeds in enumerate(shared_episodes("test", episodes))
+    ]
 
 
 def summary_sentence(task: Task, result: dict[str, Any]) -> str:

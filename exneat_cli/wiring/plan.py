@@ -85,6 +85,32 @@ class Plan:
         shapes = {module.subpopulation: module.shape for module in self.modules}
         return tuple(shapes[index] for index in range(len(shapes)))
 
+    def check(self) -> None:
+        """Refuse a plan that points outside of itself, as a damaged file's might.
+
+        Raises:
+            ValueError: a pin, an actuator or a subpopulation does not exist.
+        """
+        subpopulations = {module.subpopulation for module in self.modules}
+        if subpopulations != set(range(len(subpopulations))):
+            raise ValueError(f"subpopulations are not numbered without gaps: {sorted(subpopulations)}")
+        for module in self.modules:
+            if not all(0 <= actuator < self.action_size for actuator in module.drives):
+                raise ValueError(f"{module.name} drives an actuator that does not exist: {module.drives}")
+            if len(module.drives) > module.outputs:
+                raise ValueError(f"{module.name} drives more actuators than it has outputs")
+            for pin in module.pins:
+                if not 0 <= pin.index < self._readable(pin):
+                    raise ValueError(f"{module.name} has a pin that reads what does not exist: {pin}")
+
+    def _readable(self, pin: Pin) -> int:
+        if pin.kind == "sensor":
+            return self.observation_size
+        if pin.kind not in ("output", "hidden") or not 0 <= pin.module < len(self.modules):
+            return 0
+        source = self.modules[pin.module]
+        return source.outputs if pin.kind == "output" else source.hidden
+
     def hidden_is_linked(self, module: int) -> bool:
         """Whether another module reads hidden nodes of `module`."""
         return any(pin.kind == "hidden" and pin.module == module for m in self.modules for pin in m.pins)

@@ -112,7 +112,7 @@ def assert_equal_to_reference(plan: Plan, genomes: list[neat.DefaultGenome], fee
     rng = np.random.default_rng(seed)
     for _ in range(STEPS):
         observation = rng.normal(size=plan.observation_size)
-        activate(brain, memory, observation, action)
+        activate(brain, memory, observation, action, rng)
         np.testing.assert_allclose(action, slow.step(observation), rtol=1e-12, atol=0.0)
 
 
@@ -168,5 +168,5 @@ def test_hidden_nodes_that_were_deleted_are_read_as_zero(ant_settings: Evolution
 def test_the_motionless_brain_holds_every_actuator_at_zero() -> None:
     brain = motionless(105, 8)
     action = np.ones(8)
-    activate(brain, fresh_memory(brain), np.full(105, 7.0), action)
+    activate(brain, fresh_memory(brain), np.full(105, 7.0), action, np.random.default_rng(0))
     assert not action.any()

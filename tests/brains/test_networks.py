@@ -64,7 +64,7 @@ def assert_equal_outputs(genome: neat.DefaultGenome, config: neat.Config, networ
     for _ in range(STEPS):
         observation = rng.normal(size=INPUTS)
         expected = network.activate(observation)  # type: ignore[attr-defined]
-        activate(brain, memory, observation, action)
+        activate(brain, memory, observation, action, rng)
         np.testing.assert_allclose(action, expected, rtol=1e-12, atol=0.0)
 
 

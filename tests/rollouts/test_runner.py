@@ -165,9 +165,11 @@ def test_random_actions_repeat_with_their_seed_and_stay_in_bounds() -> None:
     seeds = shared_episodes("test", 1)[0]
 
     def act(seed: int) -> float:
-        brain = RandomActions(low, high, generator(stream(seed, "random_actions", 0)))
+        job = Job(RandomActions(low, high), seeds._replace(actions=stream(seed, "random_actions", 0)))
         with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
-            return runner.run([Job(brain, seeds)])[0].full_reward
+            (outcome,) = runner.run([job])
+            assert len(runner.trace(job)) == outcome.steps + 1
+            return outcome.full_reward
 
     assert act(0) == act(0)
     assert act(0) != act(1)

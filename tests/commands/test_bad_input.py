@@ -1,0 +1,180 @@
+"""What users get wrong: at most three lines, exit code 2, no traceback, nothing half-made."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.main import main
+
+LONGEST = 3
+
+
+def overrides(output: Path) -> list[str]:
+    return ["budget=smoke", f"output={output}"]
+
+
+CASES = [
+    # what is given, and what the message must name
+    (["sed=3"], "sed: unknown key"),
+    (["+sed=3"], "did you mean seed?"),
+    (["+task.foo=1"], "task.foo: unknown key"),
+    (["task.max_step=5"], "task.max_step: unknown key"),
+    (["+evolution.elitsm=1"], "did you mean evolution.elitism?"),
+    (["executor=serial", "executor.workers=2"], "executor.workers: unknown key"),
+    (["seed=-1"], "seed: expected a whole number of at least 0, got -1"),
+    (["seed=abc"], "seed: expected"),
+    (["seed=1.5"], "seed: expected"),
+    (["seed=true"], "seed: expected"),
+    (["seed=null"], "seed: expected"),
+    (["seed=1,2"], "--multirun"),
+    (["generations=0"], "generations: expected"),
+    (["generations=many"], "generations: expected"),
+    (["population=1"], "population: expected"),
+    (["episodes=-3"], "episodes: expected"),
+    (["noise.sensor_std=nan"], "noise.sensor_std: expected"),
+    (["noise.sensor_std=-0.1"], "noise.sensor_std: expected"),
+    (["noise.sensor_std=inf"], "noise.sensor_std: expected"),
+    (["noise.reset_scale=[1]"], "noise.reset_scale: expected"),
+    (["task.patience=-1"], "task.patience: expected"),
+    (["task.max_steps=null"], "task.max_steps: expected"),
+    (["task.reward=full"], "task.reward: expected one of thesis, gymnasium, got 'full'"),
+    (["task.sector_order=random"], "task.sector_order: expected"),
+    (["evolution.activation=swish"], "evolution.activation: expected"),
+    (["evolution.survival=2"], "evolution.survival: expected"),
+    (["pairing=best"], "pairing: expected"),
+    (["task=atn"], "task=atn: no such option; known: ant"),
+    (["geometry=triangle"], "geometry=triangle: no such option; known: all, cross, custom, fb, lr, single"),
+    (["task=null"], "Config group override"),
+    (["~task"], "generations: refers to budgets.smoke.generations"),
+    (["geometry=custom"], "geometry.vector: expected"),
+    (["geometry=custom", "geometry.vector=[0,2]"], "without gaps"),
+    (["geometry=custom", "geometry.vector=[0,1]"], "4 entries"),
+    (["geometry=custom", "geometry.vector=abc"], "geometry.vector: expected"),
+    (["geometry=all", "geometry.vector=[0,0,1,1]"], "geometry=custom"),
+    (["algorithm=neat", "geometry=all"], "algorithm=neat has no sector modules"),
+    (["algorithm=random", "linkage=output"], "algorithm=random has no sector modules"),
+    (["linkage=feedback", "wiring.central=false"], "wiring.central=true"),
+    (["linkage=hidden", "evolution.module_hidden=0"], "evolution.module_hidden"),
+    (["wiring.central=maybe"], "wiring.central: expected true or false"),
+    (["wiring.central=false", "wiring.output_width=3"], "wiring.output_width: expected"),
+    (["wiring=3"], "wiring: expected a section"),
+    (["name=../../x"], "name: expected one folder name"),
+    (["name=/etc"], "name: expected one folder name"),
+    (["name="], "name: expected one folder name"),
+    (["seed"], "missing EQUAL"),
+    (["seed=[1,2"], "no viable alternative"),
+    (["--bogus"], "--bogus: unknown flag"),
+    (["--config-dir"], "expected a value after it"),
+    (["--config-dir", "nowhere-at-all"], "nowhere-at-all"),
+    (["--cfg", "everything"], "--cfg: expected one of job, hydra, all"),
+]
+
+
+def assert_refused(code: int, message: str, named: str) -> None:
+    assert code == 2, message
+    assert named in message
+    assert "Traceback" not in message
+    assert 1 <= len(message.strip().splitlines()) <= LONGEST, message
+
+
+@pytest.mark.parametrize(("given", "named"), CASES, ids=[" ".join(given) for given, _ in CASES])
+def test_bad_settings_are_refused_before_anything_is_made(
+    given: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code = main(["train", *overrides(tmp_path / "out"), *given])
+    captured = capfd.readouterr()
+    assert_refused(code, captured.err, named)
+    assert not captured.out
+    assert not list(tmp_path.iterdir())
+
+
+FILES = {
+    "empty": (b"", "generations: refers to budgets.smoke.generations"),
+    "tab": (b"task:\n\tname: ant\n", "tab.yaml"),
+    "syntax": (b"task: {name: ant\n", "syntax.yaml"),
+    "duplicate": (b"task:\n  name: ant\n  name: ant\n", "duplicate.yaml"),
+    "latin": (b"task: \xff\xfe\n", "not UTF-8"),
+    "dangling": (b"# @package _global_\ntask:\n  name: ${nowhere}\n", "refers to"),
+    "stranger": (b"# @package _global_\ntask:\n  name: unicycle\nbudgets: {smoke: {}}\n", "refers to"),
+    "scalar": (b"7\n", ""),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_unusable_configuration_files_are_refused(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    content, named = FILES[name]
+    (tmp_path / "mine" / "task").mkdir(parents=True)
+    (tmp_path / "mine" / "task" / f"{name}.yaml").write_bytes(content)
+    code = main(["train", "--config-dir", str(tmp_path / "mine"), f"task={name}", *overrides(tmp_path / "out")])
+    assert_refused(code, capfd.readouterr().err, named)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
+def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    code = main(["train", *overrides(tmp_path / "file")])
+    assert_refused(code, capfd.readouterr().err, "the run directory cannot be made")
+
+
+@pytest.mark.skipif(os.name != "posix" or os.getuid() != 0, reason="permissions bind everyone but root")
+def test_an_output_on_a_file_system_that_cannot_be_written_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
+    code = main(["train", *overrides(Path("/proc/exneat"))])
+    assert_refused(code, capfd.readouterr().err, "/proc/exneat")
+
+
+def test_a_directory_that_cannot_be_written_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    if os.getuid() == 0:
+        pytest.skip("root may write everywhere")
+    tmp_path.chmod(0o500)
+    code = main(["train", *overrides(tmp_path / "out")])
+    assert_refused(code, capfd.readouterr().err, "Permission denied")
+
+
+def test_a_directory_that_holds_something_else_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["train", *overrides(tmp_path), "algorithm=random"]) == 0
+    (run,) = (tmp_path / "ant").iterdir()
+    capfd.readouterr()
+    (run / "manifest.json").unlink()
+    assert_refused(main(["train", *overrides(tmp_path), "algorithm=random"]), capfd.readouterr().err, "manifest.json")
+    (run / "manifest.json").write_text("{")
+    assert_refused(main(["train", *overrides(tmp_path), "algorithm=random"]), capfd.readouterr().err, "manifest.json")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["fly"], "fly: expected a command"),
+        (["inspect", "run=nowhere"], "no run is there"),
+        (["inspect", "somewhere"], "expected run="),
+        (["inspect", "run="], "expected run="),
+    ],
+)
+def test_bad_commands_are_refused(arguments: list[str], named: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert_refused(main(arguments), capfd.readouterr().err, named)
+
+
+def test_a_bad_job_of_a_multirun_leaves_the_others_alone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    code = main(["train", "-m", *overrides(tmp_path), "algorithm=random", "seed=0,-1,2"])
+    error = capfd.readouterr().err
+    assert code == 2
+    assert "seed=-1: seed: expected a whole number" in error
+    assert "Traceback" not in error
+    assert sorted(path.name.rsplit("-", 1)[0] for path in (tmp_path / "ant").iterdir()) == ["random-s0", "random-s2"]
+
+
+def test_the_same_holds_for_the_installed_program(tmp_path: Path) -> None:
+    program = Path(sys.executable).parent / "exneat"
+    done = subprocess.run(
+        [program, "train", "seed=x", *overrides(tmp_path / "out")], capture_output=True, text=True, check=False
+    )
+    assert_refused(done.returncode, done.stderr, "seed: expected")
+    assert not done.stdout

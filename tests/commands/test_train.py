@@ -1,0 +1,132 @@
+"""`exneat train` and `exneat inspect` as users run them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from exneat_cli.commands.composition import configuration_directory
+from exneat_cli.main import main
+from exneat_cli.runs import RunSettings
+
+
+def train(*arguments: str) -> int:
+    return main(["train", "budget=smoke", "test_episodes=1", "validation_episodes=1", "task.max_steps=80", *arguments])
+
+
+def the_run(output: Path) -> Path:
+    (run,) = (output / "ant").iterdir()
+    return run
+
+
+def test_a_run_ends_with_its_files_and_one_sentence_and_a_second_one_repeats_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert train(f"output={tmp_path}", "geometry=all") == 0
+    first = capfd.readouterr()
+    run = the_run(tmp_path)
+    for name in ("history.csv", "champion.json", "plots/training.png", "plots/training.svg", "manifest.json"):
+        assert str(run / name) in first.out
+        assert (run / name).stat().st_size > 0
+    assert "generation 2/2" in first.err
+    sentence = first.out.strip().splitlines()[-1]
+    assert "for standing still and" in sentence
+    assert train(f"output={tmp_path}", "geometry=all") == 0
+    second = capfd.readouterr()
+    assert "finished already" in second.out
+    assert second.out.strip().splitlines()[-1] == sentence
+    assert not second.err
+
+
+def test_the_manifest_tells_where_the_run_came_from(tmp_path: Path) -> None:
+    assert train(f"output={tmp_path}", "algorithm=neat", "seed=5") == 0
+    manifest = json.loads((the_run(tmp_path) / "manifest.json").read_text())
+    assert manifest["status"] == "done"
+    assert manifest["command"][:2] == ["exneat", "train"]
+    assert "seed=5" in manifest["command"]
+    assert manifest["budget_spent"]["episodes"] == 20
+    assert {"python", "neat-python", "mujoco", "numba"} <= set(manifest["versions"])
+
+
+def test_a_saved_configuration_trains_the_same_run_elsewhere(tmp_path: Path) -> None:
+    assert train(f"output={tmp_path / 'a'}", "geometry=lr", "noise=sensor") == 0
+    run = the_run(tmp_path / "a")
+    again = ["train", "--config-path", str(run.resolve()), f"output={tmp_path / 'b'}"]
+    assert main(again) == 0
+    assert (the_run(tmp_path / "b") / "champion.json").read_bytes() == (run / "champion.json").read_bytes()
+
+
+def test_a_multirun_trains_every_combination(tmp_path: Path) -> None:
+    assert train("-m", f"output={tmp_path}", "algorithm=random", "seed=0,1", "noise.sensor_std=0,0.1") == 0
+    assert len(list((tmp_path / "ant").iterdir())) == 4
+
+
+def test_inspect_shows_sensors_joints_and_sizes_of_every_module(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert train(f"output={tmp_path}", "geometry=cross", "linkage=full") == 0
+    capfd.readouterr()
+    assert main(["inspect", f"run={the_run(tmp_path)}"]) == 0
+    shown = capfd.readouterr().out
+    assert "5 modules, 3 subpopulations, feed-forward" in shown
+    assert "senses   5-6, 19-20, 33-50" in shown
+    assert "hidden 0-3 of back_left, of the previous step" in shown
+    assert "drives   hip_4, ankle_4, hip_1, ankle_1, hip_2, ankle_2, hip_3, ankle_3" in shown
+    assert "48 inputs" in shown
+
+
+def test_inspect_lists_the_runs_with_their_results(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", f"output={tmp_path}"]) == 0
+    assert "No runs below" in capfd.readouterr().out
+    assert train(f"output={tmp_path}", "algorithm=random") == 0
+    capfd.readouterr()
+    assert main(["inspect", f"output={tmp_path}"]) == 0
+    listed = capfd.readouterr().out.splitlines()
+    assert listed[1].startswith("done")
+    assert listed[1].endswith(str(the_run(tmp_path)))
+    assert main(["inspect", f"run={the_run(tmp_path)}"]) == 2
+    assert "random actions have no networks" in capfd.readouterr().err
+
+
+def composed(*arguments: str) -> RunSettings:
+    done = subprocess.run(
+        [Path(sys.executable).parent / "exneat", "train", "--cfg", "job", "--resolve", *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    plain = yaml.safe_load(done.stdout)
+    return RunSettings.from_plain({key: value for key, value in plain.items() if key not in ("budget", "budgets")})
+
+
+def test_the_defaults_in_conf_are_those_of_the_dataclasses() -> None:
+    from_files, from_python = composed().to_plain(), RunSettings(name="ant").to_plain()
+    assert from_files == from_python
+
+
+def test_every_key_in_conf_carries_a_comment() -> None:
+    bare = []
+    for path in sorted(configuration_directory().rglob("*.yaml")):
+        explained_above = path.parent.name in ("algorithm", "geometry", "linkage", "budget")
+        for line in path.read_text(encoding="utf-8").splitlines():
+            is_value = ":" in line and not line.rstrip().endswith(":") and not line.lstrip().startswith(("#", "-"))
+            if is_value and "#" not in line and not explained_above and "name:" not in line and "{" not in line:
+                bare.append(f"{path.name}: {line}")
+    assert not bare
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], []])
+def test_help_and_version_import_nothing_heavy(arguments: list[str]) -> None:
+    code = (
+        "import sys\n"
+        "from exneat_cli.main import main\n"
+        f"assert main({arguments!r} or None if {arguments!r} else ['--help']) == 0\n"
+        "heavy = {'pandas', 'matplotlib', 'numba', 'mujoco', 'gymnasium', 'hydra', 'numpy'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

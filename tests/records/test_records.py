@@ -1,0 +1,132 @@
+"""What is written is whole, repeats, and is read back as data."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import (
+    HistoryRow,
+    RunDirectory,
+    configuration_hash,
+    find_runs,
+    read_champion,
+    read_json,
+    write_csv,
+    write_history,
+    write_json,
+    write_whole,
+)
+
+
+def test_a_failed_write_keeps_the_old_file_and_leaves_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "history.csv"
+    write_whole(path, "old")
+
+    def full_disk(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(ExneatError, match=r"history\.csv: could not be written: No space left"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_floats_in_csv_keep_every_bit(tmp_path: Path) -> None:
+    values = [0.1 + 0.2, math.pi, 1e-300, -0.0, 5.0]
+    write_csv(tmp_path / "t.csv", ["a"], [[value] for value in values])
+    with (tmp_path / "t.csv").open() as file:
+        assert [float(row["a"]) for row in csv.DictReader(file)] == values
+
+
+def test_json_with_nan_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError):
+        write_json(tmp_path / "m.json", {"x": math.nan})
+    assert not list(tmp_path.iterdir())
+
+
+def test_history_has_the_columns_of_the_design(tmp_path: Path) -> None:
+    write_history(tmp_path / "history.csv", [HistoryRow(1, 2.0, 1.0, 1.5, 2.0, 10, 500, 1, 96, 4, 0, 0, 0.1)])
+    header, row = (tmp_path / "history.csv").read_text().splitlines()
+    assert header == (
+        "generation,best_fitness,mean_fitness,median_fitness,best_so_far,episodes,env_steps,species,"
+        "connections,hidden_nodes,failed_episodes,extinctions,wall_seconds"
+    )
+    assert row == "1,2.0,1.0,1.5,2.0,10,500,1,96,4,0,0,0.1"
+
+
+@pytest.mark.parametrize("content", ["", "[1]", "{", "\xff\x00", "null"])
+def test_what_is_no_json_object_is_refused_by_name(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "manifest.json"
+    path.write_text(content, encoding="latin-1")
+    with pytest.raises(ExneatError, match=r"manifest\.json: expected"):
+        read_json(path)
+
+
+def test_the_hash_ignores_where_and_how_but_not_what() -> None:
+    base = {
+        "seed": 1,
+        "task": {"name": "ant"},
+        "executor": {"workers": 1},
+        "output": "a",
+        "name": None,
+        "resume": False,
+    }
+    elsewhere = {**base, "executor": {"workers": 4}, "output": "b", "name": "n", "resume": True}
+    assert configuration_hash(base) == configuration_hash(elsewhere)
+    assert configuration_hash(base) != configuration_hash({**base, "seed": 2})
+    assert configuration_hash(base, with_seed=False) == configuration_hash({**base, "seed": 2}, with_seed=False)
+    assert configuration_hash(base) != configuration_hash({**base, "task": {"name": "maze"}})
+
+
+def test_a_new_directory_is_claimed_and_a_finished_run_is_found(tmp_path: Path) -> None:
+    run = RunDirectory(tmp_path / "ant" / "neat-s0-abcdef")
+    assert run.claim("hash", resume=False) is True
+    run.update_manifest(configuration_hash="hash", status="done")
+    assert run.claim("hash", resume=False) is False
+    assert [found.path for found in find_runs(tmp_path)] == [run.path]
+
+
+@pytest.mark.parametrize("status", ["running", "failed", "interrupted"])
+def test_an_unfinished_run_is_refused_naming_resume(tmp_path: Path, status: str) -> None:
+    run = RunDirectory(tmp_path / "ant" / "run")
+    run.claim("hash", resume=False)
+    run.update_manifest(configuration_hash="hash", status=status)
+    with pytest.raises(ExneatError, match=f"status {status}.*\n.*resume=true"):
+        run.claim("hash", resume=False)
+    assert run.claim("hash", resume=True) is True
+
+
+@pytest.mark.parametrize("resume", [True, False])
+def test_somebody_elses_directory_is_never_claimed(tmp_path: Path, resume: bool) -> None:
+    empty = RunDirectory(tmp_path / "empty")
+    empty.path.mkdir()
+    with pytest.raises(ExneatError, match=r"without manifest\.json"):
+        empty.claim("hash", resume=resume)
+    other = RunDirectory(tmp_path / "other")
+    other.claim("another hash", resume=False)
+    other.update_manifest(configuration_hash="another hash", status="done")
+    with pytest.raises(ExneatError, match="another configuration"):
+        other.claim("hash", resume=resume)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {},
+        {"format": 2},
+        {"format": 1},
+        {"format": 1, "arm": "x", "task": {}, "actuators": [], "plan": {"modules": [1]}},
+    ],
+)
+def test_a_damaged_champion_is_refused_by_name(tmp_path: Path, content: dict[str, object]) -> None:
+    path = tmp_path / "champion.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ExneatError, match=r"champion\.json: (expected|damaged)"):
+        read_champion(path)

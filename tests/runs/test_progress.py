@@ -1,0 +1,24 @@
+"""What a log gets to see."""
+
+from __future__ import annotations
+
+import io
+
+from exneat_cli.records import HistoryRow
+from exneat_cli.runs import Lines
+
+
+def row(generation: int) -> HistoryRow:
+    return HistoryRow(generation, 12.34, 5.0, 4.0, 12.34, 10, 500, 1, 96, 4, 0, 0, 2.0 * generation)
+
+
+def test_a_log_gets_about_ten_lines_and_always_the_last_generation() -> None:
+    stream = io.StringIO()
+    lines = Lines(stream)
+    lines.start("neat-s0", 95)
+    for generation in range(1, 96):
+        lines.generation(row(generation))
+    lines.stop()
+    written = stream.getvalue().splitlines()
+    assert 9 <= len(written) <= 12
+    assert written[-1] == "neat-s0: generation 95/95  best 12.3  mean 5.0  best so far 12.3  2.00 s each"

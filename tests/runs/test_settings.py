@@ -1,0 +1,73 @@
+"""Settings of a run: names, hashes, refusals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.runs import RunSettings
+from exneat_cli.tasks import AntTask
+from exneat_cli.wiring import Geometry, Wiring
+
+
+@pytest.mark.parametrize(
+    ("changes", "arm"),
+    [
+        ({"algorithm": "neat"}, "neat"),
+        ({"algorithm": "random"}, "random"),
+        ({"geometry": Geometry("all")}, "exneat-all-none"),
+        ({"geometry": Geometry("all"), "wiring": Wiring(central=True)}, "exneat-all-none"),
+        ({"linkage": "hidden", "wiring": Wiring(central=False)}, "exneat-single-hidden-nocentral"),
+        ({"geometry": Geometry("custom", (0, 1, 1, 2))}, "exneat-custom0112-none"),
+    ],
+)
+def test_an_arm_is_algorithm_geometry_linkage_and_central(changes: dict[str, Any], arm: str) -> None:
+    assert RunSettings(**changes).arm == arm
+
+
+def test_seeds_share_the_hash_in_the_directory_and_everything_else_changes_it() -> None:
+    def short_hash(**changes: Any) -> str:
+        return RunSettings(**changes).directory.path.name.rsplit("-", 1)[1]
+
+    assert len(short_hash()) == 6
+    assert short_hash(seed=0) == short_hash(seed=9)
+    assert short_hash(output="elsewhere", name="other") == short_hash()
+    for changes in ({"generations": 3}, {"pairing": "index"}, {"task": AntTask(patience=3)}, {"linkage": "output"}):
+        assert short_hash(**changes) != short_hash(), changes
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"generations": 0}, "generations"),
+        ({"population": 1}, "population"),
+        ({"episodes": 0}, "episodes"),
+        ({"pairing": "random"}, "pairing"),
+        ({"test_episodes": 0}, "test_episodes"),
+        ({"name": "../x"}, "name"),
+        ({"name": ".."}, "name"),
+        ({"name": "a/b"}, "name"),
+        ({"output": ""}, "output"),
+        ({"resume": "yes"}, "resume"),
+        ({"algorithm": "cma"}, "algorithm"),
+        ({"linkage": "some"}, "linkage"),
+    ],
+)
+def test_values_out_of_range_are_refused_by_their_key(changes: dict[str, Any], key: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{key}: expected"):
+        RunSettings(**changes)
+
+
+def test_settings_survive_plain_data() -> None:
+    settings = RunSettings(geometry=Geometry("custom", (0, 1, 0, 1)), task=AntTask(reward="gymnasium"), seed=4)
+    assert RunSettings.from_plain(settings.to_plain()) == settings
+
+
+def test_an_unknown_key_is_refused_with_the_closest_known_one() -> None:
+    plain = RunSettings().to_plain()
+    with pytest.raises(ExneatError, match=r"evolution\.elitsm: unknown key .*\n.*did you mean evolution\.elitism"):
+        RunSettings.from_plain({**plain, "evolution": {**plain["evolution"], "elitsm": 1}})

@@ -1,0 +1,230 @@
+"""Whole tiny runs from plain objects."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from exneat_cli.brains import Brain
+from exneat_cli.brains.brain import ACTIVATION_CODES
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import HistoryRow, RunDirectory, read_champion
+from exneat_cli.rollouts import Executor, Noise, Runner
+from exneat_cli.runs import RunSettings, train
+from exneat_cli.runs import training as training_module
+from exneat_cli.runs.scores import score_brains
+from exneat_cli.tasks import AntTask
+from exneat_cli.wiring import GEOMETRIES, LINKAGES, Geometry, Wiring
+
+TINY = {"generations": 2, "population": 6, "validation_episodes": 1, "test_episodes": 2}
+SHORT = AntTask(max_steps=60, patience=20)
+
+
+def tiny(tmp_path: Path, **changes: Any) -> RunSettings:
+    return RunSettings(**{"task": SHORT, "output": str(tmp_path), **TINY, **changes})
+
+
+def history(run: RunDirectory) -> list[dict[str, str]]:
+    with run.history.open() as file:
+        return list(csv.DictReader(file))
+
+
+def without_time(run: RunDirectory) -> list[dict[str, str]]:
+    return [{key: value for key, value in row.items() if key != "wall_seconds"} for row in history(run)]
+
+
+@pytest.mark.parametrize(("linkage", "central"), list(itertools.product(LINKAGES, [True, False])))
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_every_combination_that_makes_sense_trains(tmp_path: Path, geometry: str, linkage: str, central: bool) -> None:
+    if linkage in ("feedback", "full") and not central:
+        pytest.skip("refused: these links read a central module")
+    vector = (0, 1, 1, 2) if geometry == "custom" else None
+    settings = tiny(
+        tmp_path, geometry=Geometry(geometry, vector), linkage=linkage, wiring=Wiring(central), population=4
+    )
+    finished = train(settings)
+    assert len(history(finished.directory)) == 2
+    assert finished.result["champion"]["episodes"] == 2
+
+
+@pytest.mark.parametrize("changes", [{"pairing": "index"}, {"episodes": 2}, {"noise": Noise(0.2, 0.0)}])
+def test_other_settings_train_too(tmp_path: Path, changes: dict[str, Any]) -> None:
+    finished = train(tiny(tmp_path, geometry=Geometry("all"), **changes))
+    assert int(history(finished.directory)[-1]["episodes"]) == 2 * 6 * changes.get("episodes", 1)
+
+
+def test_neat_trains_and_leaves_every_file_of_the_design(tmp_path: Path) -> None:
+    finished = train(tiny(tmp_path, algorithm="neat"))
+    names = {path.name for path in finished.directory.path.iterdir()}
+    assert names == {
+        *("manifest.json", "config.yaml", "history.csv", "champion.json", "hall_of_fame.jsonl", "trace.csv")
+    }
+    assert finished.directory.path.name.startswith("neat-s0-")
+
+
+def test_random_actions_are_tested_without_training(tmp_path: Path) -> None:
+    finished = train(tiny(tmp_path, algorithm="random"))
+    names = {path.name for path in finished.directory.path.iterdir()}
+    assert names == {"manifest.json", "config.yaml", "robustness.csv", "trace.csv"}
+    with finished.directory.robustness.open() as file:
+        (row,) = csv.DictReader(file)
+    assert (row["arm"], row["parameter"], row["level"], row["episodes"]) == ("random", "none", "0.0", "2")
+    assert float(row["fitness_mean"]) == finished.result["champion"]["fitness_mean"]
+    assert finished.summary.startswith("No training: on 2 test episodes random actions earned")
+
+
+@pytest.mark.parametrize("algorithm", ["exneat", "neat"])
+def test_the_history_is_the_same_for_any_number_of_workers(tmp_path: Path, algorithm: str) -> None:
+    rows = []
+    for workers in (1, 2, 4):
+        settings = tiny(
+            tmp_path / str(workers),
+            algorithm=algorithm,
+            generations=4,
+            noise=Noise(0.1),
+            executor=Executor(workers=workers),
+        )
+        rows.append(without_time(train(settings).directory))
+    assert rows[0] == rows[1] == rows[2]
+
+
+def test_seed_zero_works_and_two_seeds_differ(tmp_path: Path) -> None:
+    zero, one = (train(tiny(tmp_path, seed=seed)) for seed in (0, 1))
+    assert zero.directory.path != one.directory.path
+    assert without_time(zero.directory) != without_time(one.directory)
+
+
+def test_history_counts_add_up(tmp_path: Path) -> None:
+    rows = history(train(tiny(tmp_path, generations=5)).directory)
+    assert [int(row["generation"]) for row in rows] == [1, 2, 3, 4, 5]
+    assert [int(row["episodes"]) for row in rows] == [6, 12, 18, 24, 30]
+    steps = [int(row["env_steps"]) for row in rows]
+    assert all(6 <= after - before <= 6 * 60 for before, after in zip([0, *steps], steps, strict=False))
+    best = [float(row["best_fitness"]) for row in rows]
+    assert [float(row["best_so_far"]) for row in rows] == list(np.maximum.accumulate(best))
+    for row in rows:
+        assert float(row["best_fitness"]) >= float(row["median_fitness"])
+
+
+def test_a_finished_run_is_found_not_trained_again(tmp_path: Path) -> None:
+    first = train(tiny(tmp_path))
+    before = {path: path.stat().st_mtime_ns for path in first.directory.path.iterdir()}
+    again = train(tiny(tmp_path, executor=Executor(workers=1)))
+    assert (first.trained_now, again.trained_now) == (True, False)
+    assert again.summary == first.summary
+    assert {path: path.stat().st_mtime_ns for path in first.directory.path.iterdir()} == before
+
+
+def test_an_interrupted_run_can_be_done_again_with_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    undisturbed = train(tiny(tmp_path / "a"))
+
+    def interrupt(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("exneat_cli.runs.run.write_history", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            train(tiny(tmp_path / "b"))
+    directory = tiny(tmp_path / "b").directory
+    assert directory.read_manifest()["status"] == "interrupted"
+    with pytest.raises(ExneatError, match="resume=true"):
+        train(tiny(tmp_path / "b"))
+    train(tiny(tmp_path / "b", resume=True))
+    assert without_time(directory) == without_time(undisturbed.directory)
+    assert directory.champion.read_bytes() == undisturbed.directory.champion.read_bytes()
+    assert directory.read_manifest()["status"] == "done"
+
+
+def test_the_champion_in_the_file_earns_the_figures_beside_it(tmp_path: Path) -> None:
+    settings = tiny(tmp_path, geometry=Geometry("lr"), linkage="full", generations=3)
+    finished = train(settings)
+    champion = read_champion(finished.directory.champion)
+    assert champion.plan == settings.plan
+    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
+        (tested,) = score_brains(runner, [champion.brain()], "test", settings.test_episodes)
+    assert vars(tested) == champion.scores["test"] == finished.result["champion"]
+
+
+def test_the_champion_is_the_best_of_the_hall_of_fame_on_validation(tmp_path: Path) -> None:
+    settings = tiny(tmp_path, population=20, generations=3, validation_episodes=2)
+    finished = train(settings)
+    hall = [json.loads(line) for line in finished.directory.hall_of_fame.read_text().splitlines()]
+    scores = read_champion(finished.directory.champion).scores
+    assert [entry["validation_fitness"] for entry in hall] == sorted(
+        (entry["validation_fitness"] for entry in hall), reverse=True
+    )
+    assert hall[0]["validation_fitness"] == scores["validation"]["fitness_mean"]
+    assert hall[0]["training_fitness"] == scores["training"]["fitness"]
+
+
+def test_training_stops_early_but_the_test_does_not(tmp_path: Path) -> None:
+    finished = train(tiny(tmp_path, task=AntTask(max_steps=300, patience=5, progress=1.0), generations=1))
+    (row,) = history(finished.directory)
+    assert int(row["env_steps"]) == 6 * 5
+    assert finished.result["standing_still"]["full_reward_mean"] > 250
+
+
+def test_the_written_configuration_reads_back_as_the_same_run(tmp_path: Path) -> None:
+    settings = tiny(tmp_path, geometry=Geometry("custom", (0, 1, 1, 0)), linkage="output", seed=3)
+    finished = train(settings)
+    again = RunSettings.from_plain(yaml.safe_load(finished.directory.config.read_text()))
+    assert again == settings
+    assert again.full_hash == finished.directory.read_manifest()["configuration_hash"]
+
+
+def exploding(brain: Brain) -> Brain:
+    """NaN weights; identity activations, since neat-python's tanh clips NaN to a number."""
+    return brain._replace(
+        edge_weight=np.full_like(brain.edge_weight, np.nan),
+        activation=np.full_like(brain.activation, ACTIVATION_CODES["identity"]),
+    )
+
+
+def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assemble = training_module.assemble
+    calls = itertools.count()
+
+    def every_other_explodes(*arguments: Any, **options: Any) -> Brain:
+        brain = assemble(*arguments, **options)
+        return exploding(brain) if next(calls) % 2 == 0 else brain
+
+    monkeypatch.setattr(training_module, "assemble", every_other_explodes)
+    seen: list[HistoryRow] = []
+    settings = tiny(tmp_path, population=10, generations=4)
+    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
+        trained = training_module.evolve(settings, runner, lambda rows: seen.append(rows[-1]))
+    assert [row.failed_episodes for row in seen] == [5, 5, 5, 5]
+    assert all(row.best_fitness > -100.0 for row in seen)
+    assert all(np.isfinite(row).all() for row in seen)
+    assert all(entry.fitness > -100.0 for entry in trained.hall_of_fame)
+
+
+def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assemble = training_module.assemble
+    monkeypatch.setattr(training_module, "assemble", lambda *a, **o: exploding(assemble(*a, **o)))
+    with pytest.raises(ExneatError, match="no team ever finished"):
+        train(tiny(tmp_path))
+    manifest = tiny(tmp_path).directory.read_manifest()
+    assert manifest["status"] == "failed"
+    assert "no team ever finished" in manifest["error"]
+    assert [row["failed_episodes"] for row in history(tiny(tmp_path).directory)] == ["6", "6"]
+
+
+def test_exploding_physics_leaves_no_log_of_mujoco_in_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ExneatError, match="no team ever finished"):
+        train(tiny(tmp_path / "out", noise=Noise(0.0, reset_scale=50.0)))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
