@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Iterator
@@ -117,6 +118,11 @@ class RunDirectory:
                 "  add resume=true to do it again from its first generation, with the same results"
             )
         return True
+
+    def give_up(self) -> None:
+        """Remove a claimed directory in which nothing could be written."""
+        with contextlib.suppress(OSError):
+            self.path.rmdir()
 
     def read_manifest(self) -> dict[str, Any]:
         """The manifest as plain data.

@@ -123,7 +123,7 @@ class Runner:
         return trace
 
     def _prepare(self, jobs: Sequence[Job]) -> None:
-        """Bind the loops here, in one thread: while numba sets up its cache, others must not."""
+        """Bind every loop before threads start, so that they share it."""
         for brain_type in {type(job.brain) for job in jobs} - set(self._loops):
             self._loops[brain_type] = episode_loop(self._any_simulation, brain_type, self._task.name)
 

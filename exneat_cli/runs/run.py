@@ -13,6 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, assemble, motionless
+from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Team
 from exneat_cli.records import (
     DONE,
@@ -82,7 +83,11 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
     if not directory.claim(settings.full_hash, resume=settings.resume):
         result = directory.read_manifest()["result"]
         return Finished(directory, result, summary_sentence(settings.task, result), trained_now=False)
-    _open_records(settings, command)
+    try:
+        _open_records(settings, command)
+    except ExneatError:
+        directory.give_up()
+        raise
     progress = progress or Silence()
     try:
         result = _do(settings, directory, progress)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import threading
 import types
 from collections.abc import Callable
 from importlib.metadata import version
@@ -20,6 +21,7 @@ import numba
 from numba import config
 
 _COMPILED_ROOMS = ("tasks", "brains", "rollouts")
+_CACHE_SET_UP = threading.Lock()
 
 
 @functools.cache
@@ -45,6 +47,11 @@ def cache_directory() -> Path | None:
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` on its first call: releases the GIL, divides like NumPy, cached if possible."""
     directory = cache_directory()
+    with _CACHE_SET_UP:
+        return _compiled_into(directory, function)
+
+
+def _compiled_into(directory: Path | None, function: Callable[..., Any]) -> Callable[..., Any]:
     before = config.CACHE_DIR  # type: ignore[attr-defined]
     config.CACHE_DIR = "" if directory is None else str(directory)  # type: ignore[attr-defined]
     try:

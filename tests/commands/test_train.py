@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -91,6 +93,26 @@ def test_inspect_lists_the_runs_with_their_results(tmp_path: Path, capfd: pytest
     assert listed[1].endswith(str(the_run(tmp_path)))
     assert main(["inspect", f"run={the_run(tmp_path)}"]) == 2
     assert "random actions have no networks" in capfd.readouterr().err
+
+
+def test_ctrl_c_marks_the_run_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
+    program = Path(sys.executable).parent / "exneat"
+    process = subprocess.Popen(
+        [program, "train", f"output={tmp_path}", "population=10", "generations=100000"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 120
+    while not list(tmp_path.glob("ant/*/history.csv")):
+        assert process.poll() is None, process.stderr
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert error.strip().splitlines()[-1].startswith("exneat: interrupted")
+    assert "Traceback" not in error
+    assert json.loads((the_run(tmp_path) / "manifest.json").read_text())["status"] == "interrupted"
 
 
 def composed(*arguments: str) -> RunSettings:

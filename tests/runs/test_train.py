@@ -181,6 +181,16 @@ def test_the_written_configuration_reads_back_as_the_same_run(tmp_path: Path) ->
     assert again.full_hash == finished.directory.read_manifest()["configuration_hash"]
 
 
+def test_a_run_whose_first_write_fails_leaves_no_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full_disk(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(ExneatError, match="No space left"):
+        train(tiny(tmp_path))
+    assert not tiny(tmp_path).directory.path.exists()
+
+
 def exploding(brain: Brain) -> Brain:
     """NaN weights; identity activations, since neat-python's tanh clips NaN to a number."""
     return brain._replace(

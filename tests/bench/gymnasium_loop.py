@@ -1,0 +1,67 @@
+"""Whole episodes against the loop that a user of neat-python and Gymnasium would write."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import gymnasium
+import neat
+import numpy as np
+
+from exneat_cli.rollouts import Outcome, Runner
+from exneat_cli.seeding import generator
+from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
+from tests.bench.workload import Episode, Workload, open_runner
+
+BAR = Bar(1.5, at_least=True)
+TOLERANCE = 1e-6
+"""Largest relative difference of the two sides' forward rewards."""
+
+
+def compare_with_gymnasium(workload: Workload, repetitions: int) -> Row:
+    """Environment steps per second of ours, on one thread, over those of neat-python on Gymnasium's Ant-v5.
+
+    Both times begin with the genomes: ours has `assemble`, neat-python's has `FeedForwardNetwork.create`.
+
+    Raises:
+        VerificationError: the forward rewards of an episode differ.
+    """
+    env = gymnasium.make("Ant-v5")
+    with open_runner(threads=1) as runner:
+        _check_rewards(workload, runner, env)
+        pairs = [
+            Pair(
+                partial(seconds_of, partial(_run_ours, runner, workload._replace(episodes=[episode]))),
+                partial(seconds_of, partial(_forward_reward, env, episode, workload.config)),
+            )
+            for episode in workload.episodes
+        ]
+        ratios = speed_ratios(pairs, repetitions)
+    env.close()
+    return Row("exneat / neat-python on Gymnasium's Ant-v5, NEAT 105-6-8, steps/s, 1 thread", RATIO, ratios, BAR)
+
+
+def _run_ours(runner: Runner, workload: Workload) -> list[Outcome]:
+    return runner.run(workload.jobs())
+
+
+def _forward_reward(env: gymnasium.Env[Any, Any], episode: Episode, config: neat.Config) -> float:
+    network = neat.nn.FeedForwardNetwork.create(episode.genome, config)
+    env.unwrapped.np_random = generator(episode.seeds.world)
+    observation, _ = env.reset()
+    total, over = 0.0, False
+    while not over:
+        observation, _, terminated, truncated, info = env.step(np.array(network.activate(observation)))
+        total += info["reward_forward"]
+        over = terminated or truncated
+    return total
+
+
+def _check_rewards(workload: Workload, runner: Runner, env: gymnasium.Env[Any, Any]) -> None:
+    for episode, outcome in zip(workload.episodes, _run_ours(runner, workload), strict=True):
+        expected = _forward_reward(env, episode, workload.config)
+        if not abs(outcome.fitness - expected) <= TOLERANCE * abs(expected):
+            raise VerificationError(
+                f"forward reward of genome {episode.genome.key}: {outcome.fitness!r}; Gymnasium gives {expected!r}"
+            )

@@ -1,0 +1,101 @@
+"""What one row of the table holds, and how ratios are measured."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+RATIO = "ratio"
+SECONDS = "s"
+MEGABYTES = "MB"
+"""Units of the rows; 1 MB is 10^6 bytes."""
+
+
+class VerificationError(RuntimeError):
+    """The two sides of a comparison did not do the same, or a process failed: no figure would count."""
+
+
+@dataclass(frozen=True)
+class Bar:
+    """What a row's median should reach.
+
+    Attributes:
+        value: in the row's unit.
+        at_least: whether the median should be `value` or more, else less than `value`.
+    """
+
+    value: float
+    at_least: bool
+
+    def __str__(self) -> str:
+        return f"{'at least' if self.at_least else 'under'} {self.value:g}"
+
+    def met_by(self, median: float) -> bool:
+        """Whether `median`, in the row's unit, reaches the bar."""
+        return median >= self.value if self.at_least else median < self.value
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table.
+
+    Attributes:
+        comparison: what was compared or measured, in words.
+        unit: one of `RATIO`, `SECONDS` and `MEGABYTES`.
+        values: one per repetition, in that unit.
+        bar: what their median should reach.
+        note: what a reader needs to judge the figures by.
+    """
+
+    comparison: str
+    unit: str
+    values: Sequence[float]
+    bar: Bar
+    note: str = ""
+
+    @property
+    def median(self) -> float:
+        """Median over the repetitions, in the row's unit."""
+        return statistics.median(self.values)
+
+    @property
+    def verdict(self) -> str:
+        """``meets`` or ``misses``."""
+        return "meets" if self.bar.met_by(self.median) else "misses"
+
+
+def seconds_of(work: Callable[[], object]) -> float:
+    """Wall seconds of one call."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+class Pair(NamedTuple):
+    """The two sides of a comparison, for one piece of the work.
+
+    Attributes:
+        ours, reference: do the same number of environment steps once and return their wall seconds.
+    """
+
+    ours: Callable[[], float]
+    reference: Callable[[], float]
+
+
+def speed_ratios(pairs: Sequence[Pair], repetitions: int) -> list[float]:
+    """How many times as fast as the reference we are, one value per repetition.
+
+    Args:
+        pairs: the pieces of one repetition. Both sides take turns from piece to piece, so that a machine
+            that slows down for a second slows down both.
+        repetitions: how often all pieces are done.
+    """
+    ratios = []
+    for _ in range(repetitions):
+        seconds = [(pair.ours(), pair.reference()) for pair in pairs]
+        our_seconds, reference_seconds = (sum(side) for side in zip(*seconds, strict=True))
+        ratios.append(reference_seconds / our_seconds)
+    return ratios
