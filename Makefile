@@ -15,7 +15,7 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 
 ant: $(VENV)/installed ## train ExNEAT on Ant (a few minutes) and say what was learned
-	@$(BIN)/exneat train task=ant geometry=all budget=quick
+	@$(BIN)/exneat train task=ant geometry=all budget=quick resume=true
 
 test: check tests ## checks and tests
 

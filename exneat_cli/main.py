@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -14,6 +15,9 @@ COMMANDS = {
     "inspect": "show a run's wiring, or list the runs",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
+
+USAGE = {"inspect": "usage: exneat inspect [run=<run directory>] [output=<root of runs, outputs by default>]"}
+"""What --help prints for the commands that Hydra does not answer for."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -30,6 +34,14 @@ usage: exneat <command> [key=value ...]
 """
 
 
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a run as cleanly as Ctrl-C does."""
+
+
+def _terminate(number: int, frame: object) -> None:
+    raise _Terminated
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code: 0 done, 2 refused, 130 interrupted.
 
@@ -43,16 +55,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if command in ("-V", "--version"):
         print(f"exneat {__version__}")
         return 0
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         if command not in COMMANDS:
             raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
+        if rest in (["--help"], ["-h"]) and command in USAGE:
+            print(USAGE[command])
+            return 0
         code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
         return code
     except ExneatError as error:
         print(f"exneat: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("exneat: interrupted; the same command with resume=true does the run again", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as interrupt:
+        print("exneat: interrupted; the same command with resume=true does an unfinished run again", file=sys.stderr)
+        return 143 if isinstance(interrupt, _Terminated) else 130
     except BrokenPipeError:
         return 0

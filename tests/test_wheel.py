@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -32,6 +34,35 @@ def test_the_wheel_carries_conf_and_no_tests(unpacked: Path) -> None:
     packaged = {str(path.relative_to(unpacked / "exneat_cli" / "conf")) for path in unpacked.rglob("conf/**/*.yaml")}
     assert packaged == {str(path.relative_to(ROOT / "conf")) for path in (ROOT / "conf").rglob("*.yaml")}
     assert not (unpacked / "tests").exists()
+
+
+def test_the_wheel_asks_for_every_library_that_it_imports(unpacked: Path) -> None:
+    (metadata,) = unpacked.glob("*.dist-info/METADATA")
+    required = {
+        re.match(r"Requires-Dist: ([A-Za-z0-9_-]+)", line)[1]  # type: ignore[index]
+        for line in metadata.read_text().splitlines()
+        if line.startswith("Requires-Dist:") and "extra ==" not in line
+    }
+    imported = {
+        name.split(".")[0]
+        for path in (unpacked / "exneat_cli").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [str(node.module)]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    distributions = {"hydra": "hydra-core", "neat": "neat-python", "yaml": "pyyaml"}
+    libraries = {distributions.get(name, name) for name in imported - set(sys.stdlib_module_names) - {"exneat_cli"}}
+    assert libraries == required
+
+
+def test_the_wheel_installs_the_program(unpacked: Path) -> None:
+    (entry_points,) = unpacked.glob("*.dist-info/entry_points.txt")
+    assert "exneat = exneat_cli.main:main" in entry_points.read_text()
 
 
 def test_the_wheel_trains_away_from_the_repository(unpacked: Path, tmp_path: Path) -> None:

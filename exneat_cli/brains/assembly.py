@@ -40,6 +40,7 @@ def assemble(plan: Plan, genomes: Sequence[neat.DefaultGenome], *, feed_forward:
     size = int(ends[-1]) + len(links.sources) + 1
     edge_counts = np.concatenate([expression.edge_count for expression in expressions])
     return Brain(
+        observation_size=plan.observation_size,
         size=size,
         recurrent=not feed_forward,
         node_slot=_joined(expressions, local_to_slot, "node_slot"),

@@ -24,6 +24,7 @@ class Brain(NamedTuple):
     """A compiled team. E edges, N nodes in the order of evaluation, L links, A actuators.
 
     Attributes:
+        observation_size: entries of the observation that it was wired for.
         size: length of the value vector; its last entry stays 0.
         recurrent: all nodes advance together from the previous step's values, else one after another.
         node_slot: (N,) where each node's value is kept.
@@ -36,6 +37,7 @@ class Brain(NamedTuple):
         output_slot: (A,) slot that sets each actuator.
     """
 
+    observation_size: int
     size: int
     recurrent: bool
     node_slot: NDArray[np.int64]
@@ -54,6 +56,7 @@ def motionless(observation_size: int, action_size: int) -> Brain:
     """The brain without nodes: every actuator is held at 0."""
     none, no_value = np.zeros(0, dtype=np.int64), np.zeros(0)
     return Brain(
+        observation_size=observation_size,
         size=observation_size + 1,
         recurrent=False,
         node_slot=none,
@@ -67,6 +70,11 @@ def motionless(observation_size: int, action_size: int) -> Brain:
         link_source=none,
         output_slot=np.full(action_size, observation_size, dtype=np.int64),
     )
+
+
+def sizes(brain: Brain) -> tuple[int, int]:
+    """Lengths of the observation and the action that `brain` was wired for."""
+    return brain.observation_size, len(brain.output_slot)
 
 
 @compiled

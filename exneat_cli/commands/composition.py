@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -22,7 +23,6 @@ _HYDRA_OVERRIDES = (
     "hydra.output_subdir=null",
     "hydra/job_logging=none",
     "hydra/hydra_logging=none",
-    "hydra.sweep.dir=${output}/.multirun",
     "hydra.sweep.subdir=.",
 )
 _FLAGS = {"--help", "-h", "--hydra-help", "--version", "--resolve", "--run", "-r", "--multirun", "-m"}
@@ -62,10 +62,11 @@ def run_composed(program: str, arguments: Sequence[str], job: Callable[[DictConf
 
     os.environ["HYDRA_FULL_ERROR"] = "1"
     flags, overrides = _flags_first(program, arguments)
-    sys.argv = [program, *flags, *_HYDRA_OVERRIDES, *overrides]
     directory = str(configuration_directory())
     try:
-        hydra.main(version_base="1.3", config_path=directory, config_name="config")(guarded)()
+        with tempfile.TemporaryDirectory() as scratch:
+            sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
+            hydra.main(version_base="1.3", config_path=directory, config_name="config")(guarded)()
     except Exception as error:
         if error in raised:
             raise
@@ -83,6 +84,7 @@ def settings_from(config: DictConfig) -> RunSettings:
     except OmegaConfBaseException as error:
         raise ExneatError(_in_our_words(error)) from error
     assert isinstance(plain, dict)
+    _check_budgets(plain.get("budgets"))
     settled = {str(key): value for key, value in plain.items() if key not in ("budget", "budgets")}
     return RunSettings.from_plain(settled)
 
@@ -100,14 +102,41 @@ def _flags_first(program: str, arguments: Sequence[str]) -> tuple[list[str], lis
             flags.append(argument)
         elif name in _FLAGS_WITH_VALUE:
             value = [] if separator else [next(waiting, "")]
-            if name in ("--cfg", "-c"):
-                check_choice(name, argument.partition("=")[2] if separator else value[0], ("job", "hydra", "all"))
-            if value == [""]:
+            given = argument.partition("=")[2] if separator else value[0]
+            if not given:
                 raise ExneatError(f"{argument}: expected a value after it, got nothing")
-            flags += [argument, *value]
+            flags += [name, _checked_flag(name, given)]
         else:
             raise ExneatError(f"{argument}: unknown flag; settings are written key=value, see {program} --help")
     return flags, overrides
+
+
+def _checked_flag(name: str, value: str) -> str:
+    """A flag's value as Hydra needs it."""
+    if name in ("--cfg", "-c"):
+        check_choice(name, value, ("job", "hydra", "all"))
+    if name in ("--config-path", "-cp"):
+        return str(Path(value).absolute())
+    if name in ("--config-dir", "-cd"):
+        _refuse_shadowed_files(Path(value))
+    return value
+
+
+def _refuse_shadowed_files(directory: Path) -> None:
+    """Hydra silently prefers a packaged file to a user's of the same name."""
+    packaged = configuration_directory()
+    for path in sorted(directory.rglob("*.yaml")):
+        name = path.relative_to(directory)
+        if (packaged / name).exists():
+            raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+
+
+def _check_budgets(budgets: object) -> None:
+    fields = {"generations", "population", "episodes", "validation_episodes", "test_episodes"}
+    for name, budget in budgets.items() if isinstance(budgets, dict) else ():
+        check_choice(f"budgets.{name}", name, ("paper", "quick", "smoke"))
+        for key in budget if isinstance(budget, dict) else ():
+            check_choice(f"budgets.{name}.{key}", key, sorted(fields))
 
 
 def _in_our_words(error: Exception) -> str:
@@ -120,6 +149,8 @@ def _in_our_words(error: Exception) -> str:
         return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
     if dangling := re.search(r"Interpolation key '(.+?)' not found\s+full_key: (\S+)", text):
         return f"{dangling[2]}: refers to {dangling[1]}, which no configuration file and no override sets"
+    if loaded := re.match(r"Invalid loaded object type: (\w+)", text):
+        return f"a configuration file holds {loaded[1]}, expected keys with values"
     if isinstance(error, UnicodeDecodeError):
         return f"a configuration file is not UTF-8 text: {text}"
     cause = error.__cause__

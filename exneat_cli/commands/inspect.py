@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory, find_runs, read_champion
+from exneat_cli.records import DONE, Champion, RunDirectory, find_runs, read_champion
 from exneat_cli.wiring import Module
 
 
@@ -30,14 +30,14 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _show(run: RunDirectory) -> None:
-    if not run.manifest.exists():
+    if not run.is_there():
         raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
     manifest = run.read_manifest()
     if not run.champion.exists():
         why = "random actions have no networks" if manifest.get("arm") == "random" else "it is not finished"
         raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
     champion = read_champion(run.champion)
-    print(f"{run.path}  ({manifest['status']})")
+    print(f"{run.path}  ({manifest.get('status')})")
     kind = "feed-forward" if champion.feed_forward else "recurrent"
     subpopulations = len(champion.plan.subpopulation_shapes)
     print(f"{champion.arm}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
@@ -79,10 +79,13 @@ def _list(output: Path) -> None:
         return
     print(f"{'status':<12}{'seed':>5}  {'test fitness':>20}  run")
     for run in runs:
-        manifest = run.read_manifest()
-        tested = manifest.get("result", {}).get("champion")
-        figure = f"{tested['fitness_mean']:.1f} (sd {tested['fitness_std']:.1f})" if tested else "-"
-        print(f"{manifest.get('status', '?'):<12}{manifest.get('seed', '?'):>5}  {figure:>20}  {run.path}")
+        try:
+            manifest = run.read_manifest()
+            tested = manifest["result"]["champion"] if manifest["status"] == DONE else None
+            figure = f"{tested['fitness_mean']:.1f} (sd {tested['fitness_std']:.1f})" if tested else "-"
+            print(f"{manifest['status']:<12}{manifest['seed']:>5}  {figure:>20}  {run.path}")
+        except (ExneatError, KeyError, TypeError, ValueError):
+            print(f"{'damaged':<12}{'?':>5}  {'-':>20}  {run.path}")
 
 
 def _ranges(indices: Sequence[int]) -> str:

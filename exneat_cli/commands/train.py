@@ -11,6 +11,7 @@ from omegaconf import DictConfig
 
 from exneat_cli.commands.composition import run_composed, settings_from
 from exneat_cli.errors import ExneatError
+from exneat_cli.records import RunDirectory
 from exneat_cli.runs import progress_for_terminal, train
 
 
@@ -38,18 +39,25 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
+def _draw_what_is_missing(directory: RunDirectory, fitness_name: str) -> None:
+    lacks_training = directory.history.exists() and not (directory.plots / "training.svg").exists()
+    lacks_path = not (directory.plots / "path.svg").exists()
+    if lacks_training or lacks_path:
+        from exneat_cli.analysis import draw_path, draw_training
+
+        if lacks_training:
+            draw_training(directory, fitness_name)
+        if lacks_path:
+            draw_path(directory)
+
+
 def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     settings = settings_from(config)
     finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")
-    if not directory.plots.exists():
-        from exneat_cli.analysis import draw_path, draw_training
-
-        draw_path(directory)
-        if directory.history.exists():
-            draw_training(directory, settings.task.fitness_name)
+    _draw_what_is_missing(directory, settings.task.fitness_name)
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

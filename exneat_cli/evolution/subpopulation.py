@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import random
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import neat
 from neat.reporting import ReporterSet
 from numpy.random import SeedSequence
+
+_GLOBAL_RANDOM_STATE = threading.Lock()
+"""Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
 
 
 class Subpopulation:
@@ -70,10 +74,11 @@ class Subpopulation:
 
     @contextmanager
     def _own_random_state(self) -> Iterator[None]:
-        callers = random.getstate()
-        random.setstate(self._random_state)
-        try:
-            yield
-        finally:
-            self._random_state = random.getstate()
-            random.setstate(callers)
+        with _GLOBAL_RANDOM_STATE:
+            callers = random.getstate()
+            random.setstate(self._random_state)
+            try:
+                yield
+            finally:
+                self._random_state = random.getstate()
+                random.setstate(callers)

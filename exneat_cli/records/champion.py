@@ -73,7 +73,7 @@ def read_champion(path: Path) -> Champion:
     if content.get("format") != FORMAT:
         raise ExneatError(f"{path}: expected a champion of format {FORMAT}, got {content.get('format')!r}")
     try:
-        return Champion(
+        champion = Champion(
             arm=str(content["arm"]),
             task=dict(content["task"]),
             actuators=tuple(content["actuators"]),
@@ -82,8 +82,20 @@ def read_champion(path: Path) -> Champion:
             genomes=tuple(genome_from_data(genome) for genome in content["genomes"]),
             scores=dict(content["scores"]),
         )
-    except (KeyError, TypeError, ValueError, AttributeError, AssertionError) as error:
+        _check(champion)
+        return champion
+    except (KeyError, TypeError, ValueError, AttributeError, AssertionError, IndexError, ExneatError) as error:
         raise ExneatError(f"{path}: damaged: {type(error).__name__}: {error}") from error
+
+
+def _check(champion: Champion) -> None:
+    """Raise what `read_champion` turns into words if the parts do not fit together."""
+    champion.plan.check()
+    if len(champion.actuators) != champion.plan.action_size:
+        raise ValueError(f"names {len(champion.actuators)} actuators for {champion.plan.action_size}")
+    for figure in ("fitness_mean", "fitness_std", "episodes"):
+        float(champion.scores["test"][figure])
+    champion.brain()
 
 
 def write_hall_of_fame(path: Path, entries: Sequence[Entry], validation: Sequence[float]) -> None:
@@ -127,6 +139,4 @@ def _plan_from_data(data: dict[str, Any]) -> Plan:
         )
         for module in data["modules"]
     )
-    plan = Plan(modules, data["observation_size"], data["action_size"])
-    plan.check()
-    return plan
+    return Plan(modules, int(data["observation_size"]), int(data["action_size"]))

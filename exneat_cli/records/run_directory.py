@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import json
+import os
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import read_json, write_json
+from exneat_cli.records.files import read_json, write_json, write_whole
 
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
 """What a manifest's status can be."""
@@ -28,8 +31,17 @@ def configuration_hash(configuration: dict[str, Any], *, with_seed: bool = True)
         with_seed: without it, the seeds of one arm share a hash.
     """
     ignored = _WITHOUT_EFFECT if with_seed else (*_WITHOUT_EFFECT, "seed")
-    kept = {key: value for key, value in configuration.items() if key not in ignored}
+    kept = {key: _canonical(value) for key, value in configuration.items() if key not in ignored}
     return hashlib.sha256(json.dumps(kept, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _canonical(value: Any) -> Any:
+    """The value with 1.0 written as 1, at any depth: a number is the same however it was typed."""
+    if isinstance(value, dict):
+        return {key: _canonical(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_canonical(entry) for entry in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 @dataclass(frozen=True)
@@ -78,19 +90,27 @@ class RunDirectory:
         """Directory of the figures."""
         return self.path / "plots"
 
-    def claim(self, full_hash: str, *, resume: bool) -> bool:
-        """Make the directory ready for a run.
+    @contextlib.contextmanager
+    def claimed(self, full_hash: str, *, resume: bool) -> Iterator[bool]:
+        """Hold the directory, made if need be, against other processes.
 
-        Returns:
+        Yields:
             True if the run is to be done, False if it is finished already.
 
         Raises:
-            ExneatError: the directory cannot be made, or holds something else than this run finished.
+            ExneatError: the directory cannot be made or used, or holds something else than this run finished.
         """
-        if self.path.exists():
-            return self._claim_existing(full_hash, resume)
+        is_new = self._make()
+        with self._locked():
+            yield is_new or self._is_to_be_done(full_hash, resume)
+
+    def _make(self) -> bool:
         try:
             self.path.mkdir(parents=True)
+        except FileExistsError:
+            if self.path.is_dir():
+                return False
+            raise ExneatError(f"{self.path}: expected a directory, got a file; set name= or output=") from None
         except OSError as error:
             raise ExneatError(
                 f"{self.path}: the run directory cannot be made: {error.strerror}\n"
@@ -98,13 +118,29 @@ class RunDirectory:
             ) from error
         return True
 
-    def _claim_existing(self, full_hash: str, resume: bool) -> bool:
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        # The lock is on the directory itself: nothing is left behind, and a killed process frees it.
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY)
+        except OSError as error:
+            raise ExneatError(f"{self.path}: cannot be opened: {error.strerror}") from error
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield
+        except BlockingIOError:
+            process = self.read_manifest().get("process", "unknown") if self.manifest.exists() else "unknown"
+            raise ExneatError(f"{self.path}: another process is writing this run (process id {process})") from None
+        finally:
+            os.close(descriptor)
+
+    def _is_to_be_done(self, full_hash: str, resume: bool) -> bool:
         if not self.manifest.exists():
             raise ExneatError(
                 f"{self.path}: expected a new directory or a finished run, got one without manifest.json\n"
                 "  remove it, or set name= or output= to another place"
             )
-        manifest = read_json(self.manifest)
+        manifest = self.read_manifest()
         if manifest.get("configuration_hash") != full_hash:
             raise ExneatError(
                 f"{self.path}: holds a run with another configuration or of another version\n"
@@ -119,10 +155,26 @@ class RunDirectory:
             )
         return True
 
-    def give_up(self) -> None:
-        """Remove a claimed directory in which nothing could be written."""
+    def begin(self, config: str, manifest: dict[str, object]) -> None:
+        """Write the first two files, the manifest last; if that fails, a directory that was new is gone again.
+
+        Raises:
+            ExneatError: they cannot be written.
+        """
+        is_new = not any(self.path.iterdir())
+        try:
+            write_whole(self.config, config)
+            write_json(self.manifest, manifest)
+        except ExneatError:
+            if is_new:
+                shutil.rmtree(self.path, ignore_errors=True)
+            raise
+
+    def is_there(self) -> bool:
+        """Whether the directory holds a run, as far as one can see."""
         with contextlib.suppress(OSError):
-            self.path.rmdir()
+            return self.manifest.exists()
+        return False
 
     def read_manifest(self) -> dict[str, Any]:
         """The manifest as plain data.
@@ -133,16 +185,23 @@ class RunDirectory:
         return read_json(self.manifest)
 
     def update_manifest(self, **changes: object) -> None:
-        """Replace entries of the manifest, which is created if there is none.
+        """Replace or add entries of the manifest.
 
         Raises:
             ExneatError: it cannot be read or written.
         """
-        known = self.read_manifest() if self.manifest.exists() else {}
-        write_json(self.manifest, {**known, **changes})
+        write_json(self.manifest, {**self.read_manifest(), **changes})
 
 
 def find_runs(output: Path) -> Iterator[RunDirectory]:
-    """Every run below an output root, in alphabetical order."""
-    for manifest in sorted(output.glob("*/*/manifest.json")):
+    """Every run below an output root, in alphabetical order.
+
+    Raises:
+        ExneatError: the root cannot be read.
+    """
+    try:
+        manifests = sorted(output.glob("*/*/manifest.json"))
+    except OSError as error:
+        raise ExneatError(f"output={output}: cannot be read: {error.strerror}") from error
+    for manifest in manifests:
         yield RunDirectory(manifest.parent)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, RandomActions
+from exneat_cli.brains.brain import sizes
 from exneat_cli.errors import check_choice, check_whole
 from exneat_cli.rollouts.episode import episode_loop
 from exneat_cli.rollouts.noise import Noise
@@ -105,7 +106,11 @@ class Runner:
         self._pool.shutdown(cancel_futures=True)
 
     def run(self, jobs: Sequence[Job]) -> list[Outcome]:
-        """Outcomes in the order of the jobs."""
+        """Outcomes in the order of the jobs.
+
+        Raises:
+            ValueError: a brain was wired for other sizes of observation or action.
+        """
         self._prepare(jobs)
         return list(self._pool.map(self._run_one, jobs))
 
@@ -123,7 +128,12 @@ class Runner:
         return trace
 
     def _prepare(self, jobs: Sequence[Job]) -> None:
-        """Bind every loop before threads start, so that they share it."""
+        """Refuse brains that compiled code would let read and write elsewhere, and bind every loop."""
+        expected = self._task.observation_size, len(self._task.actuator_names)
+        for brain in {id(job.brain): job.brain for job in jobs}.values():
+            fits = sizes(brain) == expected if isinstance(brain, Brain) else len(brain.low) == expected[1]
+            if not fits:
+                raise ValueError(f"a brain for another task: expected sizes {expected} of observation and action")
         for brain_type in {type(job.brain) for job in jobs} - set(self._loops):
             self._loops[brain_type] = episode_loop(self._any_simulation, brain_type, self._task.name)
 

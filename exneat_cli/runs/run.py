@@ -13,7 +13,6 @@ import yaml
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, assemble, motionless
-from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Team
 from exneat_cli.records import (
     DONE,
@@ -28,7 +27,6 @@ from exneat_cli.records import (
     write_csv,
     write_hall_of_fame,
     write_history,
-    write_whole,
 )
 from exneat_cli.rollouts import Job, Runner
 from exneat_cli.runs.progress import Progress, Silence
@@ -80,15 +78,15 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     directory = settings.directory
-    if not directory.claim(settings.full_hash, resume=settings.resume):
+    with directory.claimed(settings.full_hash, resume=settings.resume) as to_be_done:
+        if to_be_done:
+            _train_in(directory, settings, progress or Silence(), command)
         result = directory.read_manifest()["result"]
-        return Finished(directory, result, summary_sentence(settings.task, result), trained_now=False)
-    try:
-        _open_records(settings, command)
-    except ExneatError:
-        directory.give_up()
-        raise
-    progress = progress or Silence()
+    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=to_be_done)
+
+
+def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]) -> None:
+    directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), _first_manifest(settings, command))
     try:
         result = _do(settings, directory, progress)
     except KeyboardInterrupt:
@@ -100,31 +98,30 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
     finally:
         progress.stop()
     directory.update_manifest(status=DONE, finished=_now(), result=result)
-    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=True)
 
 
-def _open_records(settings: RunSettings, command: Sequence[str]) -> None:
-    directory = settings.directory
-    directory.update_manifest(
-        format=MANIFEST_FORMAT,
-        status=RUNNING,
-        arm=settings.arm,
-        task=settings.task.name,
-        seed=settings.seed,
-        configuration_hash=settings.full_hash,
-        command=list(command),
-        started=_now(),
-        seeds={"root": settings.seed, "streams": STREAMS},
-        versions=provenance.versions(),
-        processor=provenance.processor(),
-        cores=os.cpu_count(),
-        git_commit=provenance.git_commit(),
-    )
-    write_whole(directory.config, yaml.safe_dump(settings.to_plain(), sort_keys=False))
+def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, object]:
+    return {
+        "format": MANIFEST_FORMAT,
+        "status": RUNNING,
+        "process": os.getpid(),
+        "arm": settings.arm,
+        "task": settings.task.name,
+        "seed": settings.seed,
+        "configuration_hash": settings.full_hash,
+        "command": list(command),
+        "started": _now(),
+        "seeds": {"root": settings.seed, "streams": STREAMS},
+        "versions": provenance.versions(),
+        "processor": provenance.processor(),
+        "cores": os.cpu_count(),
+        "git_commit": provenance.git_commit(),
+    }
 
 
 def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     progress.start(directory.path.name, settings.generations)
+    _tell_simulator(settings, directory, progress)
     if settings.algorithm == "random":
         return _test_random(settings, directory)
 
@@ -133,16 +130,19 @@ def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> d
         progress.generation(history[-1])
 
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        simulator = "compiled" if runner.compiled else "gymnasium"
-        directory.update_manifest(simulator=simulator)
-        if not runner.compiled:
-            progress.say("MuJoCo cannot be called from compiled code here: running over Gymnasium, which is slower")
         trained = evolve(settings, runner, report)
     last = trained.history[-1]
     spent = {"episodes": last.episodes, "env_steps": last.env_steps, "wall_seconds": last.wall_seconds}
     directory.update_manifest(budget_spent=spent)
     progress.say(f"validating {len(trained.hall_of_fame)} teams of the hall of fame")
     return _choose_champion(settings, directory, trained)
+
+
+def _tell_simulator(settings: RunSettings, directory: RunDirectory, progress: Progress) -> None:
+    compiled = settings.task.open(training=False, reset_scale=settings.noise.reset_scale).compiled
+    directory.update_manifest(simulator="compiled" if compiled else "gymnasium")
+    if not compiled:
+        progress.say("MuJoCo cannot be called from compiled code here: running over Gymnasium, which is slower")
 
 
 def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Trained) -> dict[str, Any]:

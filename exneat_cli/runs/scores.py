@@ -23,6 +23,7 @@ class Score:
         fitness_mean, fitness_std: of the task's fitness.
         full_reward_mean, full_reward_std: of the task's second figure.
         failed_episodes: how many failed; those count with the failure floor.
+        fitness: of each episode, in the order of the shared episodes.
     """
 
     episodes: int
@@ -31,6 +32,7 @@ class Score:
     full_reward_mean: float
     full_reward_std: float
     failed_episodes: int
+    fitness: tuple[float, ...]
 
 
 def score(outcomes: Sequence[Outcome]) -> Score:
@@ -44,6 +46,7 @@ def score(outcomes: Sequence[Outcome]) -> Score:
         full_reward_mean=float(full_reward.mean()),
         full_reward_std=float(full_reward.std()),
         failed_episodes=sum(outcome.failed for outcome in outcomes),
+        fitness=tuple(fitness.tolist()),
     )
 
 
@@ -64,20 +67,35 @@ def random_jobs(task: Task, root: int, episodes: int) -> list[Job]:
 
 
 def summary_sentence(task: Task, result: dict[str, Any]) -> str:
-    """What a run learned, in one sentence, from the `result` entry of its manifest."""
+    """What a run learned, in one sentence, from the `result` entry of its manifest.
+
+    It says "Learned" only if the champion beats both baselines clearly: on the same test episodes, the
+    mean difference exceeds twice its standard error.
+    """
     champion, standing = result["champion"], result["standing_still"]
     episodes = f"on {champion['episodes']} test episodes"
-    if "first_generation" not in result:
-        return (
-            f"No training: {episodes} random actions earned a {task.fitness_name} of "
-            f"{champion['fitness_mean']:.1f} on average (sd {champion['fitness_std']:.1f}), "
-            f"beside {standing['fitness_mean']:.1f} for standing still."
-        )
-    first = result["first_generation"]
-    learned = champion["fitness_mean"] > max(standing["fitness_mean"], first["fitness_mean"])
-    return (
-        f"{'Learned' if learned else 'Nothing learned'}: {episodes} the champion earned a {task.fitness_name} of "
-        f"{champion['fitness_mean']:.1f} on average (sd {champion['fitness_std']:.1f}), beside "
-        f"{standing['fitness_mean']:.1f} for standing still and {first['fitness_mean']:.1f} for the best team "
-        f"of the random first generation."
+    earned = (
+        f"earned a {task.fitness_name} of {champion['fitness_mean']:.1f} on average "
+        f"(sd {champion['fitness_std']:.1f}{_failures(champion)}), "
+        f"beside {standing['fitness_mean']:.1f} for standing still"
     )
+    if "first_generation" not in result:
+        return f"No training: {episodes} random actions {earned}."
+    first = result["first_generation"]
+    learned = _clearly_better(champion, standing) and _clearly_better(champion, first)
+    return (
+        f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
+        f"and {first['fitness_mean']:.1f} for the best team of the random first generation."
+    )
+
+
+def _failures(figures: dict[str, Any]) -> str:
+    failed = figures["failed_episodes"]
+    return f", {failed} of {figures['episodes']} episodes failed" if failed else ""
+
+
+def _clearly_better(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    difference = np.array(one["fitness"]) - np.array(other["fitness"])
+    if len(difference) < 2:
+        return False
+    return bool(difference.mean() > 2.0 * difference.std(ddof=1) / np.sqrt(len(difference)))

@@ -15,7 +15,7 @@ from exneat_cli.evolution import PAIRINGS, EvolutionSettings
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, Task
-from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
+from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring, plan_wiring
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _Part = TypeVar("_Part")
@@ -66,7 +66,7 @@ class RunSettings:
     resume: bool = False
 
     def __post_init__(self) -> None:
-        check_whole("seed", self.seed, 0)
+        check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
         check_whole("episodes", self.episodes, 1)
@@ -92,20 +92,29 @@ class RunSettings:
         """What is compared, in one word, e.g. ``exneat-all-none`` or ``neat``."""
         if self.algorithm != "exneat":
             return self.algorithm
-        geometry = self.geometry.name + "".join(str(entry) for entry in self.geometry.vector or ())
+        vector = self.geometry.subpopulations(self.task.sectors) if self.geometry.vector else ()
+        geometry = self.geometry.name + "".join(str(entry) for entry in vector)
         decentral = self.task.trunk is not None and self.wiring.central is False
         return f"exneat-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
 
     @property
     def directory(self) -> RunDirectory:
         """Where the run keeps its files: ``<output>/<name>/<arm>-s<seed>-<hash>``."""
-        short = configuration_hash(self.to_plain(), with_seed=False)[:6]
+        short = configuration_hash(self._identity(), with_seed=False)[:6]
         return RunDirectory(Path(self.output) / (self.name or self.task.name) / f"{self.arm}-s{self.seed}-{short}")
 
     @property
     def full_hash(self) -> str:
         """Hash of everything that results depend on."""
-        return configuration_hash(self.to_plain())
+        return configuration_hash(self._identity())
+
+    def _identity(self) -> dict[str, Any]:
+        """What is hashed: the settings with defaults that depend on the task spelled out."""
+        plain = self.to_plain()
+        plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
+        if self.geometry.vector is not None:
+            plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.sectors))
+        return plain
 
     def to_plain(self) -> dict[str, Any]:
         """The settings as dicts, lists, numbers and strings; `from_plain` reads them back."""

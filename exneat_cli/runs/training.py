@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -47,9 +48,19 @@ def evolve(settings: RunSettings, runner: Runner, report: Callable[[list[History
     for _ in range(settings.generations):
         training.advance()
         report(training.history)
-    if training.first_generation is None:
+    if not training.hall_of_fame.entries:
         raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
+    assert training.first_generation is not None
     return Trained(training.hall_of_fame.entries, training.first_generation, training.history)
+
+
+def _failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
+    """The fitness that evolution is told: failed teams rank behind sound ones, also behind those below the floor."""
+    if not sound:
+        return list(fitness)
+    behind = math.nextafter(min(fitness[k] for k in sound), -math.inf)
+    passed = set(sound)
+    return [value if k in passed else min(value, behind) for k, value in enumerate(fitness)]
 
 
 class _Training:
@@ -77,12 +88,12 @@ class _Training:
         teams = self._coevolution.ask()
         outcomes = self._evaluate(teams, generation)
         fitness = [self._team_fitness(episodes) for episodes in outcomes]
-        self._coevolution.tell(fitness)
         sound = [k for k, episodes in enumerate(outcomes) if not any(outcome.failed for outcome in episodes)]
+        self._coevolution.tell(_failed_last(fitness, sound))
         for k in sound:
             self.hall_of_fame.add(teams[k], fitness[k], generation)
         best = max(sound or range(len(teams)), key=lambda k: fitness[k])
-        if sound and self.first_generation is None:
+        if self.first_generation is None:
             self.first_generation = teams[best]
         self._record(teams[best], fitness, fitness[best], [outcome for team in outcomes for outcome in team])
 

@@ -68,7 +68,7 @@ class AntTask:
         reward: weights of the full reward, ``thesis`` or ``gymnasium``.
         max_steps: control steps (0.05 s each) after which an episode ends.
         progress: metres along x that count as progress, in training only.
-        patience: steps without progress after which a training episode ends; 0 never ends one.
+        patience: steps without progress, at most 1000000, that end a training episode; 0 never ends one.
 
     Raises:
         ConfigError: a value is out of range.
@@ -92,7 +92,7 @@ class AntTask:
         check_choice("task.reward", self.reward, list(CONTROL_WEIGHTS))
         check_whole("task.max_steps", self.max_steps, 1, 1_000_000)
         check_real("task.progress", self.progress, 0.0)
-        check_whole("task.patience", self.patience, 0)
+        check_whole("task.patience", self.patience, 0, 1_000_000)
 
     @property
     def sectors(self) -> tuple[Sector, ...]:

@@ -35,13 +35,18 @@ def cache_directory() -> Path | None:
     for room in _COMPILED_ROOMS:
         for path in sorted((package / room).glob("*.py")):
             digest.update(path.read_bytes())
-    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "exneat"
-    directory = Path(os.environ.get("NUMBA_CACHE_DIR") or default) / digest.hexdigest()[:16]
     try:
+        directory = _cache_root() / digest.hexdigest()[:16]
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: a user without a home directory
         return None
     return directory if os.access(directory, os.W_OK) else None
+
+
+def _cache_root() -> Path:
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "exneat"
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -26,7 +26,7 @@ CASES = [
     (["task.max_step=5"], "task.max_step: unknown key"),
     (["+evolution.elitsm=1"], "did you mean evolution.elitism?"),
     (["executor=serial", "executor.workers=2"], "executor.workers: unknown key"),
-    (["seed=-1"], "seed: expected a whole number of at least 0, got -1"),
+    (["seed=-1"], "seed: expected a whole number from 0 to 18446744073709551615, got -1"),
     (["seed=abc"], "seed: expected"),
     (["seed=1.5"], "seed: expected"),
     (["seed=true"], "seed: expected"),
@@ -47,6 +47,10 @@ CASES = [
     (["evolution.activation=swish"], "evolution.activation: expected"),
     (["evolution.survival=2"], "evolution.survival: expected"),
     (["pairing=best"], "pairing: expected"),
+    (["task.patience=99999999999999999999"], "task.patience: expected"),
+    (["seed=" + "9" * 300], "seed: expected"),
+    (["+budgets.quik.generations=3"], "budgets.quik: expected one of paper, quick, smoke"),
+    (["+budgets.smoke.generation=3"], "budgets.smoke.generation: expected one of"),
     (["task=atn"], "task=atn: no such option; known: ant"),
     (["geometry=triangle"], "geometry=triangle: no such option; known: all, cross, custom, fb, lr, single"),
     (["task=null"], "Config group override"),
@@ -82,7 +86,7 @@ def assert_refused(code: int, message: str, named: str) -> None:
     assert 1 <= len(message.strip().splitlines()) <= LONGEST, message
 
 
-@pytest.mark.parametrize(("given", "named"), CASES, ids=[" ".join(given) for given, _ in CASES])
+@pytest.mark.parametrize(("given", "named"), CASES, ids=[" ".join(given)[:60] for given, _ in CASES])
 def test_bad_settings_are_refused_before_anything_is_made(
     given: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,7 +106,8 @@ FILES = {
     "latin": (b"task: \xff\xfe\n", "not UTF-8"),
     "dangling": (b"# @package _global_\ntask:\n  name: ${nowhere}\n", "refers to"),
     "stranger": (b"# @package _global_\ntask:\n  name: unicycle\nbudgets: {smoke: {}}\n", "refers to"),
-    "scalar": (b"7\n", ""),
+    "scalar": (b"7\n", "a configuration file holds int"),
+    "ant": (b"# @package _global_\ntask:\n  name: ant\n  max_steps: 7\n", "rename yours"),
 }
 
 
@@ -129,6 +134,14 @@ def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capfd: pytest.Captu
 def test_an_output_on_a_file_system_that_cannot_be_written_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     code = main(["train", *overrides(Path("/proc/exneat"))])
     assert_refused(code, capfd.readouterr().err, "/proc/exneat")
+
+
+def test_an_output_with_an_overlong_name_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    long = tmp_path / ("x" * 300)
+    assert_refused(main(["train", *overrides(long)]), capfd.readouterr().err, "File name too long")
+    assert_refused(main(["inspect", f"run={long}"]), capfd.readouterr().err, "no run is there")
+    assert main(["inspect", f"output={long}"]) in (0, 2)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_directory_that_cannot_be_written_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -169,6 +182,7 @@ def test_a_bad_job_of_a_multirun_leaves_the_others_alone(tmp_path: Path, capfd: 
     assert "seed=-1: seed: expected a whole number" in error
     assert "Traceback" not in error
     assert sorted(path.name.rsplit("-", 1)[0] for path in (tmp_path / "ant").iterdir()) == ["random-s0", "random-s2"]
+    assert [path.name for path in tmp_path.iterdir()] == ["ant"]
 
 
 def test_the_same_holds_for_the_installed_program(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -58,7 +59,7 @@ def test_the_manifest_tells_where_the_run_came_from(tmp_path: Path) -> None:
 def test_a_saved_configuration_trains_the_same_run_elsewhere(tmp_path: Path) -> None:
     assert train(f"output={tmp_path / 'a'}", "geometry=lr", "noise=sensor") == 0
     run = the_run(tmp_path / "a")
-    again = ["train", "--config-path", str(run.resolve()), f"output={tmp_path / 'b'}"]
+    again = ["train", "--config-path", os.path.relpath(run), f"output={tmp_path / 'b'}"]
     assert main(again) == 0
     assert (the_run(tmp_path / "b") / "champion.json").read_bytes() == (run / "champion.json").read_bytes()
 
@@ -95,7 +96,55 @@ def test_inspect_lists_the_runs_with_their_results(tmp_path: Path, capfd: pytest
     assert "random actions have no networks" in capfd.readouterr().err
 
 
-def test_ctrl_c_marks_the_run_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
+def test_a_figure_that_was_cut_short_is_drawn_the_next_time(tmp_path: Path) -> None:
+    assert train(f"output={tmp_path}") == 0
+    plots = the_run(tmp_path) / "plots"
+    before = (plots / "training.svg").read_bytes()
+    (plots / "training.svg").unlink()
+    (plots / "training.png").unlink()
+    assert train(f"output={tmp_path}") == 0
+    assert (plots / "training.svg").read_bytes() == before
+
+
+def test_a_damaged_run_does_not_hide_the_others_from_the_list(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert train("-m", f"output={tmp_path}", "algorithm=random", "seed=0,1,2") == 0
+    manifests = sorted((tmp_path / "ant").glob("*/manifest.json"))
+    manifests[0].write_text("{")
+    manifests[1].write_text('{"status": "done", "seed": 1, "result": null}')
+    capfd.readouterr()
+    assert main(["inspect", f"output={tmp_path}"]) == 0
+    states = [line.split()[0] for line in capfd.readouterr().out.splitlines()[1:]]
+    assert states == ["damaged", "damaged", "done"]
+
+
+@pytest.mark.parametrize("damage", ["genomes", "actuators", "scores", "plan"])
+def test_a_champion_whose_parts_do_not_fit_is_refused(
+    damage: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert train(f"output={tmp_path}", "geometry=all") == 0
+    path = the_run(tmp_path) / "champion.json"
+    champion = json.loads(path.read_text())
+    if damage == "plan":
+        champion["plan"]["modules"][0]["pins"][0]["index"] = 10**13
+    else:
+        champion[damage] = type(champion[damage])()
+    path.write_text(json.dumps(champion))
+    capfd.readouterr()
+    assert main(["inspect", f"run={the_run(tmp_path)}"]) == 2
+    assert "champion.json: damaged" in capfd.readouterr().err
+
+
+def test_every_command_explains_itself(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", "--help"]) == 0
+    assert capfd.readouterr().out.startswith("usage: exneat inspect")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
+    tmp_path: Path, number: signal.Signals, code: int
+) -> None:
     program = Path(sys.executable).parent / "exneat"
     process = subprocess.Popen(
         [program, "train", f"output={tmp_path}", "population=10", "generations=100000"],
@@ -107,9 +156,9 @@ def test_ctrl_c_marks_the_run_interrupted_and_says_how_to_go_on(tmp_path: Path) 
         assert process.poll() is None, process.stderr
         assert time.monotonic() < deadline
         time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, error = process.communicate(timeout=30)
-    assert process.returncode == 130
+    assert process.returncode == code
     assert error.strip().splitlines()[-1].startswith("exneat: interrupted")
     assert "Traceback" not in error
     assert json.loads((the_run(tmp_path) / "manifest.json").read_text())["status"] == "interrupted"

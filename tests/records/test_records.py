@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 from pathlib import Path
@@ -85,22 +86,30 @@ def test_the_hash_ignores_where_and_how_but_not_what() -> None:
     assert configuration_hash(base) != configuration_hash({**base, "task": {"name": "maze"}})
 
 
+def claim(run: RunDirectory, full_hash: str, *, resume: bool = False) -> bool:
+    with run.claimed(full_hash, resume=resume) as to_be_done:
+        return to_be_done
+
+
+def started(path: Path, status: str, full_hash: str = "hash") -> RunDirectory:
+    run = RunDirectory(path)
+    assert claim(run, full_hash) is True
+    run.begin("seed: 0\n", {"configuration_hash": full_hash, "status": status, "process": 12345})
+    return run
+
+
 def test_a_new_directory_is_claimed_and_a_finished_run_is_found(tmp_path: Path) -> None:
-    run = RunDirectory(tmp_path / "ant" / "neat-s0-abcdef")
-    assert run.claim("hash", resume=False) is True
-    run.update_manifest(configuration_hash="hash", status="done")
-    assert run.claim("hash", resume=False) is False
+    run = started(tmp_path / "ant" / "neat-s0-abcdef", "done")
+    assert claim(run, "hash") is False
     assert [found.path for found in find_runs(tmp_path)] == [run.path]
 
 
 @pytest.mark.parametrize("status", ["running", "failed", "interrupted"])
 def test_an_unfinished_run_is_refused_naming_resume(tmp_path: Path, status: str) -> None:
-    run = RunDirectory(tmp_path / "ant" / "run")
-    run.claim("hash", resume=False)
-    run.update_manifest(configuration_hash="hash", status=status)
+    run = started(tmp_path / "ant" / "run", status)
     with pytest.raises(ExneatError, match=f"status {status}.*\n.*resume=true"):
-        run.claim("hash", resume=False)
-    assert run.claim("hash", resume=True) is True
+        claim(run, "hash")
+    assert claim(run, "hash", resume=True) is True
 
 
 @pytest.mark.parametrize("resume", [True, False])
@@ -108,12 +117,48 @@ def test_somebody_elses_directory_is_never_claimed(tmp_path: Path, resume: bool)
     empty = RunDirectory(tmp_path / "empty")
     empty.path.mkdir()
     with pytest.raises(ExneatError, match=r"without manifest\.json"):
-        empty.claim("hash", resume=resume)
-    other = RunDirectory(tmp_path / "other")
-    other.claim("another hash", resume=False)
-    other.update_manifest(configuration_hash="another hash", status="done")
+        claim(empty, "hash", resume=resume)
+    other = started(tmp_path / "other", "done", "another hash")
     with pytest.raises(ExneatError, match="another configuration"):
-        other.claim("hash", resume=resume)
+        claim(other, "hash", resume=resume)
+
+
+def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) -> None:
+    run = started(tmp_path / "run", "running")
+    with run.claimed("hash", resume=True), pytest.raises(ExneatError, match=r"another process .* \(process id 12345\)"):
+        claim(run, "hash", resume=True)
+    assert claim(run, "hash", resume=True) is True
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_a_start_that_cannot_be_written_leaves_no_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: int
+) -> None:
+    run = RunDirectory(tmp_path / "run")
+    claim(run, "hash")
+    calls = itertools.count(1)
+
+    def full_disk(descriptor: int) -> None:
+        if next(calls) == failing:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(ExneatError, match="No space left"):
+        run.begin("seed: 0\n", {})
+    assert not run.path.exists()
+
+
+def test_beginning_again_forgets_what_the_last_try_left_in_the_manifest(tmp_path: Path) -> None:
+    run = started(tmp_path / "run", "failed")
+    run.update_manifest(error="boom")
+    run.begin("seed: 0\n", {"status": "running"})
+    assert run.read_manifest() == {"status": "running"}
+
+
+def test_the_hash_does_not_depend_on_how_a_number_was_typed() -> None:
+    assert configuration_hash({"a": {"b": [0, 1.0]}}) == configuration_hash({"a": {"b": [0.0, 1]}})
+    assert configuration_hash({"a": 0.5}) != configuration_hash({"a": 0})
+    assert configuration_hash({"a": True}) != configuration_hash({"a": 1})
 
 
 @pytest.mark.parametrize(

@@ -160,6 +160,16 @@ def test_an_exploding_brain_gets_the_failure_floor_and_leaves_the_others_alone(w
         assert (outcome.fitness, outcome.full_reward) == (-100.0, -100.0)
 
 
+@pytest.mark.parametrize(
+    "brain", [motionless(3, 8), motionless(105, 2), motionless(200, 8), RandomActions(np.zeros(3), np.ones(3))]
+)
+def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(brain: Brain | RandomActions) -> None:
+    with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
+        for use in (lambda job: runner.run([job]), runner.trace):
+            with pytest.raises(ValueError, match=r"expected sizes \(105, 8\)"):
+                use(Job(brain, shared_episodes("test", 1)[0]))
+
+
 def test_random_actions_repeat_with_their_seed_and_stay_in_bounds() -> None:
     low, high = TASK.action_bounds
     seeds = shared_episodes("test", 1)[0]

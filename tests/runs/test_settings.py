@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.rollouts import Noise
 from exneat_cli.runs import RunSettings
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry, Wiring
@@ -36,6 +37,21 @@ def test_seeds_share_the_hash_in_the_directory_and_everything_else_changes_it() 
     assert short_hash(output="elsewhere", name="other") == short_hash()
     for changes in ({"generations": 3}, {"pairing": "index"}, {"task": AntTask(patience=3)}, {"linkage": "output"}):
         assert short_hash(**changes) != short_hash(), changes
+
+
+def test_the_same_run_has_one_hash_however_it_is_written() -> None:
+    same = [
+        (RunSettings(), RunSettings(noise=Noise(sensor_std=0))),
+        (RunSettings(), RunSettings(wiring=Wiring(central=True))),
+        (
+            RunSettings(geometry=Geometry("custom", (0, 1, 1, 0))),
+            RunSettings(geometry=Geometry("custom", (1, 0, 0, 1))),
+        ),
+    ]
+    for one, other in same:
+        assert one.directory == other.directory
+        assert one.full_hash == other.full_hash
+    assert RunSettings().full_hash != RunSettings(wiring=Wiring(central=False)).full_hash
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +152,7 @@ def test_the_champion_in_the_file_earns_the_figures_beside_it(tmp_path: Path) ->
     assert champion.plan == settings.plan
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         (tested,) = score_brains(runner, [champion.brain()], "test", settings.test_episodes)
-    assert vars(tested) == champion.scores["test"] == finished.result["champion"]
+    assert json.loads(json.dumps(vars(tested))) == champion.scores["test"] == finished.result["champion"]
 
 
 def test_the_champion_is_the_best_of_the_hall_of_fame_on_validation(tmp_path: Path) -> None:
@@ -216,6 +217,22 @@ def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch:
     assert all(row.best_fitness > -100.0 for row in seen)
     assert all(np.isfinite(row).all() for row in seen)
     assert all(entry.fitness > -100.0 for entry in trained.hall_of_fame)
+
+
+def test_failed_teams_rank_behind_sound_ones_that_are_below_the_floor() -> None:
+    told = training_module._failed_last([-150.0, -100.0, -120.0, -100.0], sound=[0, 2])
+    assert told[0] == -150.0
+    assert told[2] == -120.0
+    assert max(told[1], told[3]) < -150.0
+    assert training_module._failed_last([-100.0, 5.0], sound=[1]) == [-100.0, 5.0]
+    assert training_module._failed_last([-100.0, -100.0], sound=[]) == [-100.0, -100.0]
+
+
+def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) -> None:
+    alone = [without_time(train(tiny(tmp_path / "alone", seed=seed, generations=4)).directory) for seed in (0, 1)]
+    with ThreadPoolExecutor(2) as pool:
+        finished = pool.map(lambda seed: train(tiny(tmp_path / "both", seed=seed, generations=4)), (0, 1))
+        assert [without_time(run.directory) for run in finished] == alone
 
 
 def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
