@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis.figures import new_figure, save_figure, style
 from exneat_cli.records import RunDirectory
+
+MOST_PREY = 50
+"""Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
 
 
 def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
@@ -37,8 +42,14 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
 
 
 def draw_path(run: RunDirectory) -> list[Path]:
-    """The agent's path over the ground in the first test episode, coloured by time, as PNG and SVG."""
+    """The agent at work in the first test episode, as PNG and SVG.
+
+    In a grid world: its path over the tiles and their cues, and the paths of prey. Elsewhere: its path over
+    the ground, coloured by time.
+    """
     trace = pd.read_csv(run.trace)
+    if run.tiles.exists():
+        return _draw_on_tiles(run, trace, pd.read_csv(run.tiles))
     with style():
         figure = new_figure(7.0, 3.6)
         axes = figure.add_subplot()
@@ -50,3 +61,35 @@ def draw_path(run: RunDirectory) -> list[Path]:
         figure.colorbar(points, ax=axes, label="control step")
         axes.legend(loc="best")
     return save_figure(figure, run.plots / "path")
+
+
+def _draw_on_tiles(run: RunDirectory, trace: pd.DataFrame, tiles: pd.DataFrame) -> list[Path]:
+    with style():
+        figure = new_figure(9.0, 4.4)
+        for channel, axes in enumerate(figure.subplots(1, 2), start=1):
+            cues = tiles.pivot(index="row", columns="column", values=f"channel_{channel}").to_numpy()
+            path = tiles.pivot(index="row", columns="column", values="path").to_numpy()
+            picture = axes.imshow(np.ma.masked_where(path == 0, cues), cmap="YlOrBr", vmin=0.0)
+            axes.set_facecolor("#444444")
+            prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
+            for name in prey[:MOST_PREY]:
+                _draw_prey(axes, trace, name)
+            if "goal_row" in trace:
+                axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color="#009e73", markersize=12)
+            axes.plot(trace["column"], trace["row"], "-", color="#0072b2", linewidth=2.0)
+            axes.plot(trace["column"].iloc[0], trace["row"].iloc[0], "o", color="#0072b2", label="start")
+            axes.plot(trace["column"].iloc[-1], trace["row"].iloc[-1], "s", color="#0072b2", label="end")
+            axes.set(title=f"channel {channel}", xticks=[], yticks=[])
+            axes.grid(visible=False)
+            figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
+        figure.suptitle(f"{run.path.name}: first test episode")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return save_figure(figure, run.plots / "path")
+
+
+def _draw_prey(axes: Axes, trace: pd.DataFrame, prey: str) -> None:
+    free = trace[trace[f"{prey}_free"] == 1]
+    axes.plot(free[f"{prey}_column"], free[f"{prey}_row"], "-", color="#009e73", linewidth=1.0)
+    caught = len(free) < len(trace)
+    last = trace.iloc[min(len(free), len(trace) - 1)]
+    axes.plot(last[f"{prey}_column"], last[f"{prey}_row"], "x" if caught else ".", color="#009e73")

@@ -52,26 +52,6 @@ class Brain(NamedTuple):
     output_slot: NDArray[np.int64]
 
 
-def motionless(observation_size: int, action_size: int) -> Brain:
-    """The brain without nodes: every actuator is held at 0."""
-    none, no_value = np.zeros(0, dtype=np.int64), np.zeros(0)
-    return Brain(
-        observation_size=observation_size,
-        size=observation_size + 1,
-        recurrent=False,
-        node_slot=none,
-        edge_start=np.zeros(1, dtype=np.int64),
-        edge_source=none,
-        edge_weight=no_value,
-        bias=no_value,
-        response=no_value,
-        activation=none,
-        link_slot=none,
-        link_source=none,
-        output_slot=np.full(action_size, observation_size, dtype=np.int64),
-    )
-
-
 def sizes(brain: Brain) -> tuple[int, int]:
     """Lengths of the observation and the action that `brain` was wired for."""
     return brain.observation_size, len(brain.output_slot)

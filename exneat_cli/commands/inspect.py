@@ -7,7 +7,7 @@ from pathlib import Path
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import DONE, Champion, RunDirectory, find_runs, read_champion
-from exneat_cli.wiring import Module
+from exneat_cli.wiring import UNTRAINED, Module
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -34,7 +34,7 @@ def _show(run: RunDirectory) -> None:
         raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
     manifest = run.read_manifest()
     if not run.champion.exists():
-        why = "random actions have no networks" if manifest.get("arm") == "random" else "it is not finished"
+        why = "a baseline has no networks" if manifest.get("arm") in UNTRAINED else "it is not finished"
         raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
     champion = read_champion(run.champion)
     print(f"{run.path}  ({manifest.get('status')})")
@@ -44,7 +44,7 @@ def _show(run: RunDirectory) -> None:
     for module in champion.plan.modules:
         _show_module(champion, module)
     test = champion.scores["test"]
-    print(f"test: fitness {test['fitness_mean']:.1f} (sd {test['fitness_std']:.1f}), {test['episodes']} episodes")
+    print(f"test: fitness {test['fitness_mean']:.4g} (sd {test['fitness_std']:.3g}), {test['episodes']} episodes")
 
 
 def _show_module(champion: Champion, module: Module) -> None:
@@ -82,7 +82,7 @@ def _list(output: Path) -> None:
         try:
             manifest = run.read_manifest()
             tested = manifest["result"]["champion"] if manifest["status"] == DONE else None
-            figure = f"{tested['fitness_mean']:.1f} (sd {tested['fitness_std']:.1f})" if tested else "-"
+            figure = f"{tested['fitness_mean']:.4g} (sd {tested['fitness_std']:.3g})" if tested else "-"
             print(f"{manifest['status']:<12}{manifest['seed']:>5}  {figure:>20}  {run.path}")
         except (ExneatError, KeyError, TypeError, ValueError):
             print(f"{'damaged':<12}{'?':>5}  {'-':>20}  {run.path}")

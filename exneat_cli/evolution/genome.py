@@ -22,3 +22,6 @@ class HomologousGenome(neat.DefaultGenome):  # type: ignore[misc]
         config.node_indexer = count(first_hidden)
         super().configure_new(config)
         config.node_indexer = later_nodes
+        if config.positive_start:
+            for gene in self.connections.values():
+                gene.weight = abs(gene.weight)

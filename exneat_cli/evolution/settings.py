@@ -29,6 +29,7 @@ class EvolutionSettings:
         activation: of every node, with neat-python's scaling, e.g. tanh(2.5 x).
         initial_connection: connections of the first generation.
         neat_hidden, module_hidden: initial hidden nodes of NEAT's network, and of every ExNEAT module.
+        positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
         weight_sd, bias_sd: initial values are N(0, sd).
         weight_power, bias_power: a mutation adds N(0, power).
         weight_rate, bias_rate: share of values that a mutation shifts.
@@ -53,6 +54,7 @@ class EvolutionSettings:
     initial_connection: str = "full_nodirect"
     neat_hidden: int = 6
     module_hidden: int = 4
+    positive_start: bool = False
     weight_sd: float = 0.12
     weight_power: float = 0.08
     weight_rate: float = 0.8
@@ -78,6 +80,7 @@ class EvolutionSettings:
 
     def __post_init__(self) -> None:
         check_flag("evolution.feed_forward", self.feed_forward)
+        check_flag("evolution.positive_start", self.positive_start)
         check_choice("evolution.activation", self.activation, ACTIVATIONS)
         check_choice("evolution.initial_connection", self.initial_connection, INITIAL_CONNECTIONS)
         for name in ("neat_hidden", "module_hidden", "elitism", "species_elitism"):
@@ -92,6 +95,34 @@ class EvolutionSettings:
             check_real(f"evolution.{name}", getattr(self, name), 0.0, 1.0)
         for name in ("connection_add", "connection_delete", "node_add", "node_delete"):
             check_real(f"evolution.{name}", getattr(self, name), 0.0, 1.0)
+
+
+RECURRENT = EvolutionSettings(
+    feed_forward=False,
+    activation="relu",
+    initial_connection="full_direct",
+    neat_hidden=0,
+    module_hidden=0,
+    positive_start=True,
+    weight_sd=1.0,
+    weight_power=0.5,
+    bias_sd=0.0,
+    bias_power=0.0,
+    bias_rate=0.0,
+    bias_replace=0.0,
+    bound=30.0,
+    connection_add=0.25,
+    connection_delete=0.25,
+    node_add=0.25,
+    node_delete=0.25,
+    disjoint_coefficient=1.1,
+    weight_coefficient=1.1,
+    elitism=10,
+    survival=0.4,
+    min_species_size=20,
+    species_elitism=1,
+)
+"""For the grid worlds: recurrent networks without biases, which keep their signals positive at first."""
 
 
 def neat_config(
@@ -141,7 +172,9 @@ def neat_config(
             "min_species_size": settings.min_species_size,
         },
     }
-    return _read_config(sections, genome_type)
+    config = _read_config(sections, genome_type)
+    config.genome_config.positive_start = settings.positive_start
+    return config
 
 
 def _structure(settings: EvolutionSettings) -> dict[str, object]:

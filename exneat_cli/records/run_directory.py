@@ -86,6 +86,11 @@ class RunDirectory:
         return self.path / "trace.csv"
 
     @property
+    def tiles(self) -> Path:
+        """The grid world of the trace: path and cues of every tile at its end."""
+        return self.path / "tiles.csv"
+
+    @property
     def plots(self) -> Path:
         """Directory of the figures."""
         return self.path / "plots"

@@ -24,6 +24,9 @@ def _episode(  # type: ignore[no-untyped-def]
     noise_rng: Generator,
     action_rng: Generator,
     sensor_std: float,
+    lowest: float,
+    highest: float,
+    tie_noise: float,
     observation: NDArray[np.float64],
     action: NDArray[np.float64],
     totals: NDArray[np.float64],
@@ -41,6 +44,9 @@ def _episode(  # type: ignore[no-untyped-def]
         noise_rng: draws the sensor noise, in the order of the inputs.
         action_rng: draws what the agent leaves to chance.
         sensor_std: sd of that noise; 0 draws nothing.
+        lowest: noisy inputs are clipped from below.
+        highest: noisy inputs are clipped from above.
+        tie_noise: U(0, tie_noise) is added to each entry of the action; 0 draws nothing.
         observation: buffer, (observation size,).
         action: buffer, (action size,).
         totals: (terms,), overwritten with the sums of the reward terms.
@@ -60,7 +66,13 @@ def _episode(  # type: ignore[no-untyped-def]
         if sensor_std > 0.0:
             for i in range(observation.size):
                 observation[i] += noise_rng.normal(0.0, sensor_std)
+        if highest < np.inf:
+            for i in range(observation.size):
+                observation[i] = min(max(observation[i], lowest), highest)
         activate(agent, memory, observation, action, action_rng)  # type: ignore[name-defined]  # noqa: F821
+        if tie_noise > 0.0:
+            for i in range(action.size):
+                action[i] += action_rng.uniform(0.0, tie_noise)
         status = step(world, action, world_rng, terms)  # type: ignore[name-defined]  # noqa: F821
         for i in range(terms.size):
             totals[i] += terms[i]

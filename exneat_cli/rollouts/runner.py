@@ -6,14 +6,17 @@ the number of workers nor on which of them ran what.
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
+import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import PCG64, Generator
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, RandomActions
@@ -21,7 +24,7 @@ from exneat_cli.brains.brain import sizes
 from exneat_cli.errors import check_choice, check_whole
 from exneat_cli.rollouts.episode import episode_loop
 from exneat_cli.rollouts.noise import Noise
-from exneat_cli.seeding import EpisodeSeeds, generator
+from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import FAILED, Simulation, Task
 
 EXECUTORS = ("threads", "serial")
@@ -77,6 +80,19 @@ class Outcome(NamedTuple):
     failed: bool
 
 
+class Trace(NamedTuple):
+    """One episode, step by step.
+
+    Attributes:
+        steps: (steps + 1, columns); row t holds where the agent is after t steps (`Task.trace_columns`),
+            then the reward terms of step t (`Task.terms`; 0 in the first row).
+        tiles: (N, N, 3) path (1 or 0) and both channels of a grid world at the end; None elsewhere.
+    """
+
+    steps: NDArray[np.float64]
+    tiles: NDArray[np.float64] | None
+
+
 class Runner:
     """Episodes of one task under one noise; a context manager that ends its threads.
 
@@ -90,19 +106,20 @@ class Runner:
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
         self._task = task
         self._noise = noise
-        self._idle: SimpleQueue[Simulation] = SimpleQueue()
         self._loops: dict[type[Any], Callable[..., Any]] = {}
+        self._stop = threading.Event()
         self._pool = ThreadPoolExecutor(executor.threads, thread_name_prefix="episodes")
-        for _ in range(executor.threads):
-            simulation = task.open(training=training, reset_scale=noise.reset_scale)
-            self._idle.put(simulation)
-        self._any_simulation = simulation
-        self.compiled = simulation.compiled
+        self._booths = [
+            _Booth(task, noise, task.open(training=training, reset_scale=noise.reset_scale))
+            for _ in range(executor.threads)
+        ]
+        self.compiled = self._booths[0].simulation.compiled
 
     def __enter__(self) -> Runner:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._stop.set()
         self._pool.shutdown(cancel_futures=True)
 
     def run(self, jobs: Sequence[Job]) -> list[Outcome]:
@@ -112,20 +129,39 @@ class Runner:
             ValueError: a brain was wired for other sizes of observation or action.
         """
         self._prepare(jobs)
-        return list(self._pool.map(self._run_one, jobs))
+        episodes = {id(job.seeds): job.seeds for job in jobs}
+        starts = {key: _generator_states(seeds) for key, seeds in episodes.items()}
+        outcomes: list[Outcome | None] = [None] * len(jobs)
+        positions = itertools.count()
 
-    def trace(self, job: Job) -> NDArray[np.float64]:
-        """The path of one episode.
+        failed = threading.Event()
 
-        Returns:
-            (steps + 1, columns): row t holds where the agent is after t steps (`Task.trace_columns`), then
-            the reward terms of step t (`Task.terms`; 0 in the first row).
-        """
+        def work(booth: _Booth) -> None:
+            try:
+                while (k := next(positions)) < len(jobs) and not (self._stop.is_set() or failed.is_set()):
+                    job = jobs[k]
+                    outcomes[k] = booth.run(self._loops[type(job.brain)], job.brain, starts[id(job.seeds)])
+            except BaseException:
+                failed.set()
+                raise
+
+        # Each thread takes the next job when it is free: episodes differ in length, and a future each costs
+        # more than a short one.
+        workers = [self._pool.submit(work, booth) for booth in self._booths]
+        wait(workers)
+        for worker in workers:
+            worker.result()
+        return [outcome for outcome in outcomes if outcome is not None]
+
+    def trace(self, job: Job) -> Trace:
+        """The path of one episode, and the world that it went through."""
         self._prepare([job])
+        booth, loop = self._booths[0], self._loops[type(job.brain)]
+        states = _generator_states(job.seeds)
         columns = len(self._task.trace_columns) + len(self._task.terms)
-        trace = np.zeros((self._run_one(job).steps + 1, columns))
-        self._run_one(job, trace)
-        return trace
+        steps = np.zeros((booth.run(loop, job.brain, states).steps + 1, columns))
+        booth.run(loop, job.brain, states, steps)
+        return Trace(steps, self._task.tiles(booth.simulation.world))
 
     def _prepare(self, jobs: Sequence[Job]) -> None:
         """Refuse brains that compiled code would let read and write elsewhere, and bind every loop."""
@@ -135,35 +171,54 @@ class Runner:
             if not fits:
                 raise ValueError(f"a brain for another task: expected sizes {expected} of observation and action")
         for brain_type in {type(job.brain) for job in jobs} - set(self._loops):
-            self._loops[brain_type] = episode_loop(self._any_simulation, brain_type, self._task.name)
+            self._loops[brain_type] = episode_loop(self._booths[0].simulation, brain_type, self._task.name)
 
-    def _run_one(self, job: Job, trace: NDArray[np.float64] | None = None) -> Outcome:
-        task = self._task
-        totals = np.zeros(len(task.terms))
-        if trace is None:
-            trace = np.zeros((0, len(task.trace_columns) + len(task.terms)))
-        simulation = self._idle.get()
-        try:
-            status, steps = self._loops[type(job.brain)](
-                simulation.world,
-                job.brain,
-                generator(job.seeds.world),
-                generator(job.seeds.sensor_noise),
-                generator(job.seeds.actions),
-                float(self._noise.sensor_std),
-                np.zeros(task.observation_size),
-                np.zeros(len(task.actuator_names)),
-                totals,
-                trace,
-                len(task.trace_columns),
-            )
-        finally:
-            self._idle.put(simulation)
-        fitness, full_reward = task.fitness(totals), task.full_reward(totals)
-        failed = status == FAILED or not (np.isfinite(fitness) and np.isfinite(full_reward))
-        if failed:
+
+class _Booth:
+    """What one thread needs to run episodes: a world, three generators, and buffers to reuse."""
+
+    def __init__(self, task: Task, noise: Noise, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self._task = task
+        self._generators = [Generator(PCG64(0)) for _ in EpisodeSeeds._fields]
+        self._settings = (float(noise.sensor_std), *map(float, task.observation_limits), float(task.tie_noise))
+        self._observation = np.zeros(task.observation_size)
+        self._action = np.zeros(len(task.actuator_names))
+        self._totals = np.zeros(len(task.terms))
+        self._no_trace = np.zeros((0, len(task.trace_columns) + len(task.terms)))
+        self._located = len(task.trace_columns)
+
+    def run(
+        self,
+        loop: Callable[..., Any],
+        brain: Brain | RandomActions,
+        states: Sequence[dict[str, Any]],
+        trace: NDArray[np.float64] | None = None,
+    ) -> Outcome:
+        """One episode, with the generators put to `states` first."""
+        for rng, state in zip(self._generators, states, strict=True):
+            rng.bit_generator.state = state
+        status, steps = loop(
+            self.simulation.world,
+            brain,
+            *self._generators,
+            *self._settings,
+            self._observation,
+            self._action,
+            self._totals,
+            self._no_trace if trace is None else trace,
+            self._located,
+        )
+        task, totals = self._task, self._totals
+        fitness, full_reward = task.fitness_of(totals), task.full_reward_of(totals)
+        if status == FAILED or not (math.isfinite(fitness) and math.isfinite(full_reward)):
             return Outcome(task.failure_floor, task.failure_floor, int(steps), True)
         return Outcome(fitness, full_reward, int(steps), False)
+
+
+def _generator_states(seeds: EpisodeSeeds) -> list[dict[str, Any]]:
+    """Where the generators of an episode start; setting a state is cheaper than making a generator."""
+    return [dict(PCG64(seed).state) for seed in seeds]
 
 
 def _usable_cores() -> int:

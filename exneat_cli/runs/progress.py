@@ -112,4 +112,4 @@ def progress_for_terminal() -> Progress:
 
 
 def _figures(row: HistoryRow) -> str:
-    return f"best {row.best_fitness:.1f}  mean {row.mean_fitness:.1f}  best so far {row.best_so_far:.1f}"
+    return f"best {row.best_fitness:.4g}  mean {row.mean_fitness:.4g}  best so far {row.best_so_far:.4g}"

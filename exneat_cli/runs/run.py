@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, assemble, motionless
 from exneat_cli.evolution import Team
@@ -28,12 +27,13 @@ from exneat_cli.records import (
     write_hall_of_fame,
     write_history,
 )
-from exneat_cli.rollouts import Job, Runner
+from exneat_cli.rollouts import Job, Runner, Trace
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import Score, random_jobs, score, score_brains, summary_sentence
+from exneat_cli.runs.scores import Score, baseline_jobs, score, score_brains, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
+from exneat_cli.wiring import UNTRAINED
 
 MANIFEST_FORMAT = 1
 ROBUSTNESS_COLUMNS = (
@@ -122,8 +122,8 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
 def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     progress.start(directory.path.name, settings.generations)
     _tell_simulator(settings, directory, progress)
-    if settings.algorithm == "random":
-        return _test_random(settings, directory)
+    if settings.algorithm in UNTRAINED:
+        return _test_baseline(settings, directory)
 
     def report(history: list[HistoryRow]) -> None:
         write_history(directory.history, history)
@@ -166,12 +166,12 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
     return {name: asdict(each) for name, each in zip(names, tested, strict=True)}
 
 
-def _test_random(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
-    jobs = random_jobs(settings.task, settings.seed, settings.test_episodes)
+def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
+    jobs = baseline_jobs(settings.task, settings.algorithm, settings.seed, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         tested = score(runner.run(jobs))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
-        trace = runner.trace(random_jobs(settings.task, settings.seed, 1)[0])
+        trace = runner.trace(jobs[0])
     _write_trace(settings, directory, trace)
     write_csv(directory.robustness, ROBUSTNESS_COLUMNS, [_unperturbed(settings, tested)])
     return {"champion": asdict(tested), "standing_still": asdict(standing)}
@@ -187,7 +187,7 @@ def _compile(settings: RunSettings, team: Team) -> Brain:
 
 
 def _standing_still(settings: RunSettings) -> Brain:
-    return motionless(settings.task.observation_size, len(settings.task.actuator_names))
+    return motionless(settings.task.observation_size, settings.task.resting_action)
 
 
 def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
@@ -202,9 +202,12 @@ def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Cham
     )
 
 
-def _write_trace(settings: RunSettings, directory: RunDirectory, trace: NDArray[np.float64]) -> None:
+def _write_trace(settings: RunSettings, directory: RunDirectory, trace: Trace) -> None:
     columns = ("step", *settings.task.trace_columns, *settings.task.terms)
-    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.tolist())])
+    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.steps.tolist())])
+    if trace.tiles is not None:
+        tiles = [(*place, *trace.tiles[place].tolist()) for place in np.ndindex(trace.tiles.shape[:2])]
+        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), tiles)
 
 
 def _now() -> str:

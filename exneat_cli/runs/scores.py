@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from exneat_cli.brains import Brain, RandomActions
+from exneat_cli.brains import Brain, RandomActions, linear_fusion
 from exneat_cli.rollouts import Job, Outcome, Runner
 from exneat_cli.seeding import shared_episodes, stream
 from exneat_cli.tasks import Task
@@ -57,12 +57,15 @@ def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes
     return [score(outcomes[k * episodes : (k + 1) * episodes]) for k in range(len(brains))]
 
 
-def random_jobs(task: Task, root: int, episodes: int) -> list[Job]:
-    """The test episodes with actions drawn at random from the run's own stream."""
-    brain = RandomActions(*task.action_bounds)
+def baseline_jobs(task: Task, algorithm: str, root: int, episodes: int) -> list[Job]:
+    """The test episodes for ``random`` (which draws from the run's own stream) or ``linear_fusion``."""
+    tests = shared_episodes("test", episodes)
+    if algorithm == "linear_fusion":
+        brain = linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
+        return [Job(brain, seeds) for seeds in tests]
     return [
-        Job(brain, seeds._replace(actions=stream(root, "random_actions", episode)))
-        for episode, seeds in enumerate(shared_episodes("test", episodes))
+        Job(RandomActions(*task.action_bounds), seeds._replace(actions=stream(root, "random_actions", episode)))
+        for episode, seeds in enumerate(tests)
     ]
 
 
@@ -73,19 +76,20 @@ def summary_sentence(task: Task, result: dict[str, Any]) -> str:
     mean difference exceeds twice its standard error.
     """
     champion, standing = result["champion"], result["standing_still"]
+    digits = task.fitness_decimals
     episodes = f"on {champion['episodes']} test episodes"
     earned = (
-        f"earned a {task.fitness_name} of {champion['fitness_mean']:.1f} on average "
-        f"(sd {champion['fitness_std']:.1f}{_failures(champion)}), "
-        f"beside {standing['fitness_mean']:.1f} for standing still"
+        f"earned a {task.fitness_name} of {champion['fitness_mean']:.{digits}f} on average "
+        f"(sd {champion['fitness_std']:.{digits}f}{_failures(champion)}), "
+        f"beside {standing['fitness_mean']:.{digits}f} for standing still"
     )
     if "first_generation" not in result:
-        return f"No training: {episodes} random actions {earned}."
+        return f"No training: {episodes} the baseline {earned}."
     first = result["first_generation"]
     learned = _clearly_better(champion, standing) and _clearly_better(champion, first)
     return (
         f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
-        f"and {first['fitness_mean']:.1f} for the best team of the random first generation."
+        f"and {first['fitness_mean']:.{digits}f} for the best team of the random first generation."
     )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole
-from exneat_cli.evolution import PAIRINGS, EvolutionSettings
+from exneat_cli.evolution import PAIRINGS, RECURRENT, EvolutionSettings
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, Task
@@ -27,10 +27,10 @@ class RunSettings:
 
     Attributes:
         task: what is learned.
-        algorithm: ``exneat``, ``neat``, or ``random`` (no training, only the test).
+        algorithm: ``exneat``, ``neat``, or an untrained baseline, ``random`` or ``linear_fusion``.
         geometry, linkage, wiring: how modules are wired.
         noise: what disturbs the agent, in training, validation and test alike.
-        evolution: how genomes change and compete.
+        evolution: how genomes change and compete; left out, what suits the task's kind of network.
         executor: where episodes run; without effect on results.
         seed: root of all random streams but those of validation and test.
         generations, population: of each subpopulation.
@@ -52,7 +52,7 @@ class RunSettings:
     linkage: str = "none"
     wiring: Wiring = field(default_factory=Wiring)
     noise: Noise = field(default_factory=Noise)
-    evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
+    evolution: EvolutionSettings = None  # type: ignore[assignment]
     executor: Executor = field(default_factory=Executor)
     seed: int = 0
     generations: int = 40
@@ -66,6 +66,8 @@ class RunSettings:
     resume: bool = False
 
     def __post_init__(self) -> None:
+        if self.evolution is None:
+            object.__setattr__(self, "evolution", RECURRENT if self.task.needs_memory else EvolutionSettings())
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -79,6 +81,9 @@ class RunSettings:
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             mend = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, mend)
+        if not self.task.has_initial_pose and self.noise.reset_scale != Noise().reset_scale:
+            mend = f"task={self.task.name} has no initial pose that noise could disturb"
+            raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, mend)
         _ = self.plan
 
     @property

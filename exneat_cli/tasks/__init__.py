@@ -1,9 +1,42 @@
-"""What an agent senses and drives, and what counts as good. Knows nothing of networks."""
+"""What an agent senses and drives, and what counts as good. Knows nothing of networks.
+
+Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/TrackMaze-v0``.
+"""
+
+import gymnasium
 
 from exneat_cli.tasks.ant import AntTask
+from exneat_cli.tasks.mazes import GeneralMaze, TrackMaze
+from exneat_cli.tasks.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Sector, Simulation, Task
 
-TASKS: dict[str, type[AntTask]] = {"ant": AntTask}
+TASKS: dict[str, type[Task]] = {
+    "ant": AntTask,
+    "track_maze": TrackMaze,
+    "general_maze": GeneralMaze,
+    "foraging": Foraging,
+    "hunting": Hunting,
+}
 """Every task by the name it has in `conf/task`."""
 
-__all__ = ["ENDED", "FAILED", "RUNNING", "TASKS", "AntTask", "Sector", "Simulation", "Task"]
+for _world in ("TrackMaze", "GeneralMaze", "Foraging", "Hunting"):
+    gymnasium.register(
+        id=f"exneat/{_world}-v0",
+        entry_point="exneat_cli.tasks.grid_environment:GridEnvironment",
+        kwargs={"world": f"exneat/{_world}-v0"},
+    )
+
+__all__ = [
+    "ENDED",
+    "FAILED",
+    "RUNNING",
+    "TASKS",
+    "AntTask",
+    "Foraging",
+    "GeneralMaze",
+    "Hunting",
+    "Sector",
+    "Simulation",
+    "Task",
+    "TrackMaze",
+]

@@ -82,9 +82,13 @@ class AntTask:
     patience: int = 100
 
     terms: ClassVar[tuple[str, ...]] = ("forward_reward", "healthy_reward", "control_cost", "contact_cost")
-    trace_columns: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     fitness_name: ClassVar[str] = "forward reward"
+    fitness_decimals: ClassVar[int] = 1
     failure_floor: ClassVar[float] = -100.0
+    observation_limits: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
+    tie_noise: ClassVar[float] = 0.0
+    needs_memory: ClassVar[bool] = False
+    has_initial_pose: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, ["ant"])
@@ -93,6 +97,16 @@ class AntTask:
         check_whole("task.max_steps", self.max_steps, 1, 1_000_000)
         check_real("task.progress", self.progress, 0.0)
         check_whole("task.patience", self.patience, 0, 1_000_000)
+
+    @property
+    def trace_columns(self) -> tuple[str, ...]:
+        """Position of the trunk in metres."""
+        return ("x", "y", "z")
+
+    @property
+    def resting_action(self) -> NDArray[np.float64]:
+        """No torque anywhere."""
+        return np.zeros(len(self.actuator_names))
 
     @property
     def sectors(self) -> tuple[Sector, ...]:
@@ -127,11 +141,14 @@ class AntTask:
         low, high = _model().actuator_ctrlrange.T
         return low.copy(), high.copy()
 
-    def fitness(self, totals: NDArray[np.float64]) -> float:
+    def tiles(self, world: object) -> None:
+        """Ant walks on an endless plane."""
+
+    def fitness_of(self, totals: NDArray[np.float64]) -> float:
         """Forward reward of an episode, in m/s summed over control steps."""
         return float(totals[0])
 
-    def full_reward(self, totals: NDArray[np.float64]) -> float:
+    def full_reward_of(self, totals: NDArray[np.float64]) -> float:
         """Forward and healthy reward less the costs of effort and contact."""
         return float(np.sum(totals))
 

@@ -66,16 +66,32 @@ class Task(Protocol):
 
     terms: ClassVar[tuple[str, ...]]
     """Names of the reward terms that `Simulation.step` writes."""
-    trace_columns: ClassVar[tuple[str, ...]]
-    """Names of what `Simulation.locate` writes."""
     fitness_name: ClassVar[str]
     """What the fitness is, in words, for sentences and axes."""
+    fitness_decimals: ClassVar[int]
+    """Digits after the point that mean something to a reader."""
     failure_floor: ClassVar[float]
     """Fitness of an episode that failed."""
+    observation_limits: ClassVar[tuple[float, float]]
+    """What noisy inputs are clipped to."""
+    tie_noise: ClassVar[float]
+    """U(0, tie_noise) is added to each entry of the action, where the largest one wins."""
+    needs_memory: ClassVar[bool]
+    """Whether networks are recurrent by default."""
+    has_initial_pose: ClassVar[bool]
+    """Whether `noise.reset_scale` means anything."""
 
     @property
     def name(self) -> str:
         """The task's name in `conf/task` and in run directories."""
+
+    @property
+    def trace_columns(self) -> tuple[str, ...]:
+        """Names of what `Simulation.locate` writes."""
+
+    @property
+    def resting_action(self) -> NDArray[np.float64]:
+        """The action that does nothing, (actuators,)."""
 
     @property
     def sectors(self) -> tuple[Sector, ...]:
@@ -100,8 +116,11 @@ class Task(Protocol):
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new world; `training` switches on what belongs to training only, such as early stopping."""
 
-    def fitness(self, totals: NDArray[np.float64]) -> float:
+    def tiles(self, world: Any) -> NDArray[np.float64] | None:
+        """(N, N, 3) path (1 or 0) and both channels of every tile of a grid world; None elsewhere."""
+
+    def fitness_of(self, totals: NDArray[np.float64]) -> float:
         """Fitness of an episode whose terms add up to `totals`."""
 
-    def full_reward(self, totals: NDArray[np.float64]) -> float:
+    def full_reward_of(self, totals: NDArray[np.float64]) -> float:
         """The second figure that tests report; equals the fitness where a task has only one."""

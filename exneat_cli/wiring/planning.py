@@ -11,7 +11,8 @@ from exneat_cli.wiring.geometry import Geometry
 from exneat_cli.wiring.linkage import LINKAGES, link_pins
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan, sensor_pins
 
-ALGORITHMS = ("exneat", "neat", "random")
+ALGORITHMS = ("exneat", "neat", "random", "linear_fusion")
+UNTRAINED = ("random", "linear_fusion")
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,8 @@ def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wi
 
     Args:
         task: gives sectors, trunk and sizes.
-        algorithm: ``neat`` (one module senses and drives everything) or ``exneat``; ``random`` has no
-            modules at all.
+        algorithm: ``neat`` (one module senses and drives everything) or ``exneat``; ``random``
+            and ``linear_fusion`` have no modules at all.
         geometry: which modules share genomes.
         linkage: one of `LINKAGES`.
         wiring: the central module's settings.
@@ -55,6 +56,9 @@ def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wi
     if algorithm == "exneat":
         return _plan_modules(task, geometry, linkage, wiring, hidden)
     _refuse_modular_settings(algorithm, geometry, linkage, wiring)
+    if algorithm == "linear_fusion" and any(len(sector.actuators) != 1 for sector in task.sectors):
+        mend = "it moves to where the sum of a sector's sensors is largest, so only grid worlds have it"
+        raise ConfigError("algorithm", "exneat, neat or random", algorithm, mend)
     actuators = tuple(range(len(task.actuator_names)))
     everything = Module(
         name="body",
@@ -113,10 +117,12 @@ def _check_links(task: Task, linkage: str, wiring: Wiring, central: bool, hidden
         raise ConfigError("wiring.central", "false", True, f"task={task.name} has no trunk for a central module")
     if linkage in ("feedback", "full") and not central:
         mend = "these links read a central module: set wiring.central=true"
+        if task.trunk is None:
+            mend = f"these links read a central module, and task={task.name} has no trunk for one"
         raise ConfigError("linkage", "none, output or hidden without a central module", linkage, mend)
     if linkage in ("hidden", "full") and hidden == 0:
         mend = "modules start without hidden nodes here: set evolution.module_hidden"
-        raise ConfigError("linkage", "none, output or feedback", linkage, mend)
+        raise ConfigError("linkage", "links that read no hidden nodes", linkage, mend)
     if not central and wiring.output_width != Wiring().output_width:
         mend = "without a central module each sector module has one output per actuator"
         raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, mend)

@@ -1,0 +1,55 @@
+"""Brains that follow a fixed rule: the baselines that nothing trains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.brains.brain import ACTIVATION_CODES, Brain
+from exneat_cli.tasks import Sector
+
+
+def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brain:
+    """Does the same at every step: `resting_action`, (A,)."""
+    return weighted_sums(np.zeros((len(resting_action), observation_size)), resting_action)
+
+
+def linear_fusion(observation_size: int, action_size: int, sectors: Sequence[Sector]) -> Brain:
+    """Moves to where the sum of all channels is largest.
+
+    Each sector's actuators get the sum of its sensors, all others 0.
+    """
+    weights = np.zeros((action_size, observation_size))
+    for sector in sectors:
+        weights[np.ix_(sector.actuators, sector.sensors)] = 1.0
+    return weighted_sums(weights, np.zeros(action_size))
+
+
+def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Brain:
+    """The brain whose action is ``weights @ observation + bias``.
+
+    Args:
+        weights: (A, observation size); zeros become no edges.
+        bias: (A,).
+    """
+    actions, inputs = weights.shape
+    targets, sources = np.nonzero(weights)
+    none = np.zeros(0, dtype=np.int64)
+    slots = inputs + np.arange(actions, dtype=np.int64)
+    return Brain(
+        observation_size=inputs,
+        size=inputs + actions + 1,
+        recurrent=False,
+        node_slot=slots,
+        edge_start=np.searchsorted(targets, np.arange(actions + 1)).astype(np.int64),
+        edge_source=sources.astype(np.int64),
+        edge_weight=weights[targets, sources],
+        bias=np.array(bias, dtype=np.float64),
+        response=np.ones(actions),
+        activation=np.full(actions, ACTIVATION_CODES["identity"], dtype=np.int64),
+        link_slot=none,
+        link_source=none,
+        output_slot=slots,
+    )
