@@ -1,1 +1,1 @@
-"""How fast training on Ant is, as ratios that are measured side by side; run with `python -m tests.bench`."""
+"""How fast episodes and trainings are, most of it as ratios measured side by side: `python -m tests.bench`."""

@@ -82,7 +82,7 @@ def _record(simulation: Simulation, job: Job, runner: Runner) -> Recording:
         controls.append(action.copy())
         status = simulation.step(world, action, rng, terms)
     final_x = _trunk_x(simulation)
-    _check_x("step by step", final_x, float(runner.trace(job)[-1, 0]))
+    _check_x("step by step", final_x, float(runner.trace(job).steps[-1, 0]))
     return Recording(job.seeds, np.array(controls), final_x)
 
 

@@ -99,3 +99,43 @@ def speed_ratios(pairs: Sequence[Pair], repetitions: int) -> list[float]:
         our_seconds, reference_seconds = (sum(side) for side in zip(*seconds, strict=True))
         ratios.append(reference_seconds / our_seconds)
     return ratios
+
+
+class Pace(NamedTuple):
+    """Agent steps that were done, and the wall seconds that they took."""
+
+    steps: int
+    seconds: float
+
+    @property
+    def rate(self) -> float:
+        """Steps per second."""
+        return self.steps / self.seconds
+
+
+class Paces(NamedTuple):
+    """What `pace_ratios` found.
+
+    Attributes:
+        ratios: steps per second of ours over those of the reference, one value per repetition.
+        ours, reference: the last repetition.
+    """
+
+    ratios: list[float]
+    ours: Pace
+    reference: Pace
+
+
+def pace_ratios(pairs: Sequence[tuple[Callable[[], Pace], Callable[[], Pace]]], repetitions: int) -> Paces:
+    """`speed_ratios` for sides that do not do the same number of steps.
+
+    Args:
+        pairs: ours and the reference for every piece of one repetition; the sides take turns.
+        repetitions: how often all pieces are done, at least 1.
+    """
+    ratios = []
+    for _ in range(repetitions):
+        sides = zip(*[(ours(), reference()) for ours, reference in pairs], strict=True)
+        ours, reference = (Pace(sum(p.steps for p in side), sum(p.seconds for p in side)) for side in sides)
+        ratios.append(ours.rate / reference.rate)
+    return Paces(ratios, ours, reference)

@@ -166,7 +166,7 @@ def test_hidden_nodes_that_were_deleted_are_read_as_zero(ant_settings: Evolution
 
 
 def test_the_motionless_brain_holds_every_actuator_at_zero() -> None:
-    brain = motionless(105, 8)
+    brain = motionless(105, np.zeros(8))
     action = np.ones(8)
     activate(brain, fresh_memory(brain), np.full(105, 7.0), action, np.random.default_rng(0))
     assert not action.any()

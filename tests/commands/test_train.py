@@ -16,6 +16,7 @@ import yaml
 from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.main import main
 from exneat_cli.runs import RunSettings
+from exneat_cli.tasks import TASKS
 
 
 def train(*arguments: str) -> int:
@@ -56,6 +57,24 @@ def test_the_manifest_tells_where_the_run_came_from(tmp_path: Path) -> None:
     assert {"python", "neat-python", "mujoco", "numba"} <= set(manifest["versions"])
 
 
+@pytest.mark.parametrize("task", ["track_maze", "general_maze", "foraging", "hunting"])
+@pytest.mark.parametrize("algorithm", ["exneat", "neat", "linear_fusion", "random"])
+def test_every_grid_world_runs_with_every_algorithm_and_shows_the_agent_at_work(
+    tmp_path: Path, task: str, algorithm: str
+) -> None:
+    assert main(["train", "budget=smoke", f"task={task}", f"algorithm={algorithm}", f"output={tmp_path}"]) == 0
+    (run,) = (tmp_path / task).iterdir()
+    assert {"tiles.csv", "trace.csv", "manifest.json"} <= {path.name for path in run.iterdir()}
+    assert (run / "plots" / "path.svg").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    "changes", [["geometry=all", "linkage=output"], ["geometry=custom", "geometry.vector=[0,0,1,1]"]]
+)
+def test_grid_worlds_take_other_geometries_and_output_links(tmp_path: Path, changes: list[str]) -> None:
+    assert main(["train", "budget=smoke", "task=track_maze", f"output={tmp_path}", *changes]) == 0
+
+
 def test_a_saved_configuration_trains_the_same_run_elsewhere(tmp_path: Path) -> None:
     assert train(f"output={tmp_path / 'a'}", "geometry=lr", "noise=sensor") == 0
     run = the_run(tmp_path / "a")
@@ -93,7 +112,7 @@ def test_inspect_lists_the_runs_with_their_results(tmp_path: Path, capfd: pytest
     assert listed[1].startswith("done")
     assert listed[1].endswith(str(the_run(tmp_path)))
     assert main(["inspect", f"run={the_run(tmp_path)}"]) == 2
-    assert "random actions have no networks" in capfd.readouterr().err
+    assert "a baseline has no networks" in capfd.readouterr().err
 
 
 def test_a_figure_that_was_cut_short_is_drawn_the_next_time(tmp_path: Path) -> None:
@@ -175,8 +194,14 @@ def composed(*arguments: str) -> RunSettings:
     return RunSettings.from_plain({key: value for key, value in plain.items() if key not in ("budget", "budgets")})
 
 
-def test_the_defaults_in_conf_are_those_of_the_dataclasses() -> None:
-    from_files, from_python = composed().to_plain(), RunSettings(name="ant").to_plain()
+@pytest.mark.parametrize("task", sorted(TASKS))
+def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
+    from_files = composed(f"task={task}").to_plain()
+    from_python = RunSettings(task=TASKS[task](), name=task).to_plain()
+    budget = ("generations", "population", "episodes", "validation_episodes", "test_episodes")
+    for plain in (from_files, from_python) if task != "ant" else ():
+        for key in budget:
+            del plain[key]
     assert from_files == from_python
 
 

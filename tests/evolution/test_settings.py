@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from exneat_cli.errors import ConfigError
 from exneat_cli.evolution import EvolutionSettings, neat_config
+from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.seeding import stream
 
 
 def test_every_setting_reaches_neat_python(ant_settings: EvolutionSettings) -> None:
@@ -32,6 +35,22 @@ def test_every_setting_reaches_neat_python(ant_settings: EvolutionSettings) -> N
 def test_two_configurations_share_nothing_that_evolution_changes(ant_settings: EvolutionSettings) -> None:
     one, other = (neat_config(ant_settings, 10, (3, 2, 1)) for _ in range(2))
     assert one.genome_config is not other.genome_config
+
+
+def test_a_positive_start_makes_initial_weights_positive_and_lets_mutations_draw_both_signs(
+    grid_settings: EvolutionSettings,
+) -> None:
+    subpopulation = Subpopulation(neat_config(grid_settings, 30, (8, 0, 5)), stream(0, "evolution", 0))
+
+    def weights() -> list[float]:
+        genomes = subpopulation.genomes.values()
+        return [gene.weight for genome in genomes for gene in genome.connections.values()]
+
+    assert min(weights()) >= 0.0
+    assert 0.7 < float(np.mean(weights())) < 0.9
+    for _ in range(3):
+        subpopulation.advance(dict.fromkeys(subpopulation.genomes, 0.0))
+    assert min(weights()) < 0.0
 
 
 @pytest.mark.parametrize(

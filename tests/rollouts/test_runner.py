@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import neat
 import numpy as np
 import pytest
 
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
+from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.rollouts import Executor, Job, Noise, Outcome, Runner
+from exneat_cli.rollouts.runner import _Booth
 from exneat_cli.seeding import generator, shared_episodes, stream, training_episodes
 from exneat_cli.tasks import AntTask, mujoco_library
 from exneat_cli.wiring import Geometry, Wiring, plan_wiring
@@ -59,7 +62,7 @@ def test_the_path_over_gymnasium_gives_the_same_outcomes(training: bool) -> None
     def run(compiled: bool) -> tuple[list[Outcome], np.ndarray]:
         with Runner(TASK, Noise(0.05), Executor("serial"), training=training) as runner:
             assert runner.compiled is compiled
-            return runner.run(jobs), runner.trace(jobs[0])
+            return runner.run(jobs), runner.trace(jobs[0]).steps
 
     compiled, compiled_trace = run(compiled=True)
     with without_the_library():
@@ -77,6 +80,26 @@ def test_an_explosion_over_gymnasium_gets_the_failure_floor_too() -> None:
     assert outcome.fitness == -100.0
 
 
+def test_an_exception_in_one_episode_stops_the_others_and_leaves_the_runner_usable() -> None:
+    jobs = jobs_of(ant_brains(20))
+    run_one, begun = _Booth.run, []
+
+    def break_on_the_third(booth: _Booth, *arguments: Any) -> Outcome:
+        begun.append(arguments)
+        if arguments[1] is jobs[2].brain:
+            raise RuntimeError("broken")
+        return run_one(booth, *arguments)
+
+    with Runner(TASK, Noise(), Executor("threads", 2), training=True) as runner:
+        expected = runner.run(jobs)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_Booth, "run", break_on_the_third)
+            with pytest.raises(RuntimeError, match="broken"):
+                runner.run(jobs)
+        assert len(begun) < len(jobs)
+        assert runner.run(jobs) == expected
+
+
 def test_a_missing_library_is_said_in_words() -> None:
     with without_the_library():
         reason = mujoco_library.unreachable_because()
@@ -87,7 +110,7 @@ def test_a_missing_library_is_said_in_words() -> None:
 def test_standing_still_goes_nowhere_and_earns_about_one_per_step() -> None:
     task = AntTask()
     with Runner(task, Noise(), Executor(), training=False) as runner:
-        outcomes = runner.run([Job(motionless(105, 8), seeds) for seeds in shared_episodes("test", 3)])
+        outcomes = runner.run([Job(motionless(105, np.zeros(8)), seeds) for seeds in shared_episodes("test", 3)])
     for outcome in outcomes:
         assert outcome.steps == 1000
         assert abs(outcome.fitness) < 20
@@ -100,27 +123,19 @@ def test_sensor_noise_changes_what_a_team_does_but_not_the_start() -> None:
     traces = []
     for std in (0.0, 0.5):
         with Runner(TASK, Noise(std), Executor("serial"), training=False) as runner:
-            traces.append(runner.trace(job))
+            traces.append(runner.trace(job).steps)
     np.testing.assert_array_equal(traces[0][0], traces[1][0])
     assert not np.array_equal(traces[0][5], traces[1][5])
 
 
 def test_noise_is_drawn_in_the_order_of_the_inputs() -> None:
-    # A brain whose only edge copies input 7 to actuator 0 shows the eighth draw of the noise stream.
-    brain = motionless(105, 8)._replace(
-        size=107,
-        node_slot=np.array([105]),
-        edge_start=np.array([0, 1]),
-        edge_source=np.array([7]),
-        edge_weight=np.array([1.0]),
-        bias=np.zeros(1),
-        response=np.ones(1),
-        activation=np.array([3]),
-        output_slot=np.array([105] + [106] * 7),
-    )
+    # A brain that copies input 7 to actuator 0 shows the eighth draw of the noise stream.
+    weights = np.zeros((8, 105))
+    weights[0, 7] = 1.0
+    brain = weighted_sums(weights, np.zeros(8))
     job = Job(brain, shared_episodes("test", 1)[0])
     with Runner(AntTask(max_steps=1), Noise(0.25, reset_scale=0.0), Executor("serial"), training=False) as runner:
-        trace = runner.trace(job)
+        trace = runner.trace(job).steps
     draws = generator(job.seeds.sensor_noise).normal(0.0, 0.25, 105)
     # Input 7 is a joint's angle, 0 in the exact initial pose; the control cost shows the action.
     assert trace[1, 5] == pytest.approx(-0.01 * draws[7] ** 2, rel=1e-9)
@@ -130,7 +145,7 @@ def test_a_trace_adds_up_to_the_outcome_and_starts_where_the_world_does() -> Non
     jobs = jobs_of(ant_brains(3), episodes=1)
     with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
         for job, outcome in zip(jobs, runner.run(jobs), strict=True):
-            trace = runner.trace(job)
+            trace = runner.trace(job).steps
             assert trace.shape == (outcome.steps + 1, 7)
             assert not trace[0, 3:].any()
             assert trace[:, 3].sum() == pytest.approx(outcome.fitness)
@@ -161,7 +176,13 @@ def test_an_exploding_brain_gets_the_failure_floor_and_leaves_the_others_alone(w
 
 
 @pytest.mark.parametrize(
-    "brain", [motionless(3, 8), motionless(105, 2), motionless(200, 8), RandomActions(np.zeros(3), np.ones(3))]
+    "brain",
+    [
+        motionless(3, np.zeros(8)),
+        motionless(105, np.zeros(2)),
+        motionless(200, np.zeros(8)),
+        RandomActions(np.zeros(3), np.ones(3)),
+    ],
 )
 def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(brain: Brain | RandomActions) -> None:
     with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
@@ -178,7 +199,7 @@ def test_random_actions_repeat_with_their_seed_and_stay_in_bounds() -> None:
         job = Job(RandomActions(low, high), seeds._replace(actions=stream(seed, "random_actions", 0)))
         with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
             (outcome,) = runner.run([job])
-            assert len(runner.trace(job)) == outcome.steps + 1
+            assert len(runner.trace(job).steps) == outcome.steps + 1
             return outcome.full_reward
 
     assert act(0) == act(0)

@@ -21,4 +21,4 @@ def test_a_log_gets_about_ten_lines_and_always_the_last_generation() -> None:
     lines.stop()
     written = stream.getvalue().splitlines()
     assert 9 <= len(written) <= 12
-    assert written[-1] == "neat-s0: generation 95/95  best 12.3  mean 5.0  best so far 12.3  2.00 s each"
+    assert written[-1] == "neat-s0: generation 95/95  best 12.34  mean 5  best so far 12.34  2.00 s each"

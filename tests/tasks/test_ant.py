@@ -120,8 +120,8 @@ def test_the_full_reward_adds_up_as_in_a_case_worked_by_hand() -> None:
     expected = [(ant.world.xpos[1, 0] - before) / 0.05, 1.0, -0.01 * 8 * 0.25, -5e-4 * (forces**2).sum()]
     np.testing.assert_allclose(terms, expected, rtol=1e-12)
     task = AntTask(reward="thesis")
-    assert task.fitness(terms) == terms[0]
-    assert task.full_reward(terms) == pytest.approx(sum(expected))
+    assert task.fitness_of(terms) == terms[0]
+    assert task.full_reward_of(terms) == pytest.approx(sum(expected))
 
 
 def test_a_fallen_body_ends_the_episode_without_the_healthy_reward() -> None:

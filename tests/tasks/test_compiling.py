@@ -42,7 +42,7 @@ def test_a_second_process_finds_compiled_code_in_the_cache(tmp_path: Path) -> No
         "import numpy as np\n"
         "from exneat_cli.brains.brain import fresh_memory\n"
         "from exneat_cli.brains import motionless\n"
-        "fresh_memory(motionless(3, 2))\n"
+        "fresh_memory(motionless(3, np.zeros(2)))\n"
         "print(sum(fresh_memory.stats.cache_hits.values()), sum(fresh_memory.stats.cache_misses.values()))"
     )
     assert in_new_process(code, tmp_path) == "0 1"

@@ -1,0 +1,188 @@
+"""Grid worlds against the loop that a user of neat-python and NumPy would write, and whole trainings."""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import neat
+import numpy as np
+import yaml
+
+from exneat_cli.brains import assemble
+from exneat_cli.commands.composition import configuration_directory
+from exneat_cli.evolution import RECURRENT, neat_config
+from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.rollouts import Executor, Job, Noise, Outcome, Runner
+from exneat_cli.runs import RunSettings, train
+from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
+from exneat_cli.tasks import TASKS, GeneralMaze, Hunting, Task
+from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
+from tests.bench.measurement import RATIO, SECONDS, Bar, Pace, Row, VerificationError, pace_ratios, seconds_of
+from tests.bench.plain_python_worlds import PlainHunting, PlainMaze, PlainOutcome, PlainWorld, run_episode
+
+GENOMES = 20
+BLOCK = 10
+"""Genomes that one side runs before it is the other's turn."""
+EPISODES = 20
+"""Per genome, as in a generation of the paper budget."""
+CHECK_EPISODES = 100
+"""Per genome, before anything is timed."""
+FOLLOWERS = 5
+"""Copies of a genome that follows the cues: untrained ones tell little of the signals."""
+ROOT_SEED = 0
+STANDARD_ERRORS = 5.0
+"""Largest difference of the two sides' means; they draw different worlds."""
+ROUNDING = 1e-9
+"""Allowed on top, where all episodes agree."""
+
+SPEED_BAR = Bar(150.0, at_least=True)
+SPEED_AIM = "the aim is 300"
+PAPER_BAR = Bar(10.0, at_least=False)
+PAPER_TASKS = ("track_maze", "general_maze", "foraging", "hunting")
+PAPER_ALGORITHMS = ("exneat", "neat")
+
+
+class Contest(NamedTuple):
+    """Both sides of a comparison.
+
+    Attributes:
+        task, runner, plan: ours.
+        config: neat-python's configuration of the genomes.
+        genomes: a random first generation.
+        world: the reference's.
+        rng: that all its episodes draw from.
+    """
+
+    task: Task
+    runner: Runner
+    plan: Plan
+    config: neat.Config
+    genomes: list[neat.DefaultGenome]
+    world: PlainWorld
+    rng: np.random.Generator
+
+    def run_ours(self, genomes: Sequence[neat.DefaultGenome], seeds: Sequence[Sequence[EpisodeSeeds]]) -> list[Outcome]:
+        """Outcomes genome by genome, networks made here.
+
+        Args:
+            genomes: to be run.
+            seeds: the episodes of each of them.
+        """
+        brains = [assemble(self.plan, [genome], feed_forward=False) for genome in genomes]
+        return self.runner.run([Job(b, each) for b, episodes in zip(brains, seeds, strict=True) for each in episodes])
+
+    def run_reference(self, genomes: Sequence[neat.DefaultGenome], episodes: int) -> list[PlainOutcome]:
+        """The same with neat-python's networks in plain Python worlds, a new one for each episode."""
+        networks = [neat.nn.RecurrentNetwork.create(genome, self.config) for genome in genomes]
+        return [run_episode(self.world, network, self.rng) for network in networks for _ in range(episodes)]
+
+
+def compare_general_maze(repetitions: int) -> Row:
+    """Agent steps per second of ours, on one thread, over those of plain Python in the general maze.
+
+    Raises:
+        VerificationError: the two sides are not the same world.
+    """
+    task = GeneralMaze()
+    return _compare(task, PlainMaze(task.size), repetitions)
+
+
+def compare_hunting(repetitions: int) -> Row:
+    """The same in hunting.
+
+    Raises:
+        VerificationError: the two sides are not the same world.
+    """
+    task = Hunting()
+    parameters = {name: getattr(task, name) for name in ("size", "n_prey", "steps", "p_e", "p_c", "p_m")}
+    return _compare(task, PlainHunting(**parameters), repetitions)
+
+
+def _compare(task: Task, world: PlainWorld, repetitions: int) -> Row:
+    plan = plan_wiring(task, "neat", Geometry(), "none", Wiring(), hidden=RECURRENT.neat_hidden)
+    (shape,) = plan.subpopulation_shapes
+    config = neat_config(RECURRENT, GENOMES, shape)
+    genomes = list(Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values())
+    rng = np.random.default_rng(ROOT_SEED)
+    with Runner(task, Noise(), Executor("threads", 1), training=True) as runner:
+        contest = Contest(task, runner, plan, config, genomes, world, rng)
+        _check_same_world(contest, genomes)
+        _check_same_world(contest, [_follower(genomes[0], task)] * FOLLOWERS)
+        seeds = training_episodes(ROOT_SEED, 0, EPISODES)
+        blocks = [genomes[first : first + BLOCK] for first in range(0, len(genomes), BLOCK)]
+        pairs = [
+            (
+                partial(_pace_of, partial(contest.run_ours, block, [seeds] * len(block))),
+                partial(_pace_of, partial(contest.run_reference, block, EPISODES)),
+            )
+            for block in blocks
+        ]
+        paces = pace_ratios(pairs, repetitions)
+    note = f"{SPEED_AIM}; last repetition: {paces.ours.rate:,.0f} against {paces.reference.rate:,.0f} steps/s"
+    name = f"exneat / plain Python and NumPy, {task.name}, NEAT {'-'.join(map(str, shape))}, steps/s, 1 thread"
+    return Row(name, RATIO, paces.ratios, SPEED_BAR, note)
+
+
+def _pace_of(run: Callable[[], Sequence[Outcome] | Sequence[PlainOutcome]]) -> Pace:
+    outcomes: list[Outcome | PlainOutcome] = []
+    seconds = seconds_of(lambda: outcomes.extend(run()))
+    return Pace(sum(outcome.steps for outcome in outcomes), seconds)
+
+
+def _follower(genome: neat.DefaultGenome, task: Task) -> neat.DefaultGenome:
+    """A copy of a fully connected genome that moves to where the sum of both channels is largest."""
+    follower = copy.deepcopy(genome)
+    wanted = {(-1 - sensor, sector.actuators[0]) for sector in task.sectors for sensor in sector.sensors}
+    for key, gene in follower.connections.items():
+        gene.weight = float(key in wanted)
+    return follower
+
+
+def _check_same_world(contest: Contest, genomes: Sequence[neat.DefaultGenome]) -> None:
+    """Compare both sides' mean fitness and steps, every episode in a world of its own."""
+    name = contest.task.name
+    seeds = [training_episodes(ROOT_SEED, 1 + k, CHECK_EPISODES) for k in range(len(genomes))]
+    ours, reference = contest.run_ours(genomes, seeds), contest.run_reference(genomes, CHECK_EPISODES)
+    if any(outcome.failed for outcome in ours):
+        raise VerificationError(f"{name}: a network exploded, so there is nothing to compare")
+    for what in ("fitness", "steps"):
+        sides = [
+            np.reshape([getattr(outcome, what) for outcome in side], (len(genomes), CHECK_EPISODES))
+            for side in (ours, reference)
+        ]
+        variance = sum(side.var(axis=1, ddof=1).mean() / side.size for side in sides)
+        our_mean, reference_mean = (side.mean() for side in sides)
+        tolerance = STANDARD_ERRORS * np.sqrt(variance) + ROUNDING
+        if not abs(our_mean - reference_mean) <= tolerance:
+            raise VerificationError(
+                f"{name}: mean {what} {our_mean:.4f}; plain Python gives {reference_mean:.4f}, "
+                f"expected a difference of at most {tolerance:.4f}"
+            )
+
+
+def measure_paper_training(task: str, algorithm: str) -> Row:
+    """Wall seconds of one training, validation and test with the paper budget, everything compiled before.
+
+    Args:
+        task: a key of `TASKS`.
+        algorithm: ``exneat`` (geometry single) or ``neat``.
+    """
+    with tempfile.TemporaryDirectory() as output:
+        train(_settings(task, algorithm, "smoke", output))
+        settings = _settings(task, algorithm, "paper", output)
+        seconds = seconds_of(partial(train, settings))
+        spent = settings.directory.read_manifest()["budget_spent"]
+    name = f"whole training, paper budget, {task}, {settings.arm}, 1 thread, warm compile cache"
+    note = f"{spent['episodes']:,} training episodes, {spent['env_steps']:,} steps"
+    return Row(name, SECONDS, [seconds], PAPER_BAR, note)
+
+
+def _settings(task: str, algorithm: str, budget: str, output: str) -> RunSettings:
+    path = configuration_directory() / "task" / f"{task}.yaml"
+    numbers = yaml.safe_load(path.read_text(encoding="utf-8"))["budgets"][budget]
+    executor = Executor("threads", 1)
+    return RunSettings(task=TASKS[task](), algorithm=algorithm, executor=executor, output=output, **numbers)
