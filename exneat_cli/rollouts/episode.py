@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -17,16 +17,28 @@ from exneat_cli.tasks.compiling import compiled, with_functions
 _BRAIN_FUNCTIONS = {Brain: brain, RandomActions: random_actions}
 
 
+class Conditions(NamedTuple):
+    """What happens to inputs and actions on their way.
+
+    Attributes:
+        sensor_std: sd of the noise on every input; 0 draws nothing.
+        lowest, highest: noisy inputs are clipped to these, unless `highest` is infinite.
+        tie_noise: U(0, tie_noise) is added to each entry of the action; 0 draws nothing.
+    """
+
+    sensor_std: float
+    lowest: float
+    highest: float
+    tie_noise: float
+
+
 def _episode(  # type: ignore[no-untyped-def]
     world,
     agent,
     world_rng: Generator,
     noise_rng: Generator,
     action_rng: Generator,
-    sensor_std: float,
-    lowest: float,
-    highest: float,
-    tie_noise: float,
+    conditions: Conditions,
     observation: NDArray[np.float64],
     action: NDArray[np.float64],
     totals: NDArray[np.float64],
@@ -43,10 +55,7 @@ def _episode(  # type: ignore[no-untyped-def]
         world_rng: draws the world.
         noise_rng: draws the sensor noise, in the order of the inputs.
         action_rng: draws what the agent leaves to chance.
-        sensor_std: sd of that noise; 0 draws nothing.
-        lowest: noisy inputs are clipped from below.
-        highest: noisy inputs are clipped from above.
-        tie_noise: U(0, tie_noise) is added to each entry of the action; 0 draws nothing.
+        conditions: what happens to inputs and actions on their way.
         observation: buffer, (observation size,).
         action: buffer, (action size,).
         totals: (terms,), overwritten with the sums of the reward terms.
@@ -63,16 +72,16 @@ def _episode(  # type: ignore[no-untyped-def]
     status = RUNNING
     while status == RUNNING:
         observe(world, observation)  # type: ignore[name-defined]  # noqa: F821
-        if sensor_std > 0.0:
+        if conditions.sensor_std > 0.0:
             for i in range(observation.size):
-                observation[i] += noise_rng.normal(0.0, sensor_std)
-        if highest < np.inf:
+                observation[i] += noise_rng.normal(0.0, conditions.sensor_std)
+        if conditions.highest < np.inf:
             for i in range(observation.size):
-                observation[i] = min(max(observation[i], lowest), highest)
+                observation[i] = min(max(observation[i], conditions.lowest), conditions.highest)
         activate(agent, memory, observation, action, action_rng)  # type: ignore[name-defined]  # noqa: F821
-        if tie_noise > 0.0:
+        if conditions.tie_noise > 0.0:
             for i in range(action.size):
-                action[i] += action_rng.uniform(0.0, tie_noise)
+                action[i] += action_rng.uniform(0.0, conditions.tie_noise)
         status = step(world, action, world_rng, terms)  # type: ignore[name-defined]  # noqa: F821
         for i in range(terms.size):
             totals[i] += terms[i]

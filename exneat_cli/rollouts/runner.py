@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.brains.brain import sizes
 from exneat_cli.errors import check_choice, check_whole
-from exneat_cli.rollouts.episode import episode_loop
+from exneat_cli.rollouts.episode import Conditions, episode_loop
 from exneat_cli.rollouts.noise import Noise
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import FAILED, Simulation, Task
@@ -181,7 +181,8 @@ class _Booth:
         self.simulation = simulation
         self._task = task
         self._generators = [Generator(PCG64(0)) for _ in EpisodeSeeds._fields]
-        self._settings = (float(noise.sensor_std), *map(float, task.observation_limits), float(task.tie_noise))
+        lowest, highest = task.observation_limits
+        self._conditions = Conditions(float(noise.sensor_std), float(lowest), float(highest), float(task.tie_noise))
         self._observation = np.zeros(task.observation_size)
         self._action = np.zeros(len(task.actuator_names))
         self._totals = np.zeros(len(task.terms))
@@ -202,7 +203,7 @@ class _Booth:
             self.simulation.world,
             brain,
             *self._generators,
-            *self._settings,
+            self._conditions,
             self._observation,
             self._action,
             self._totals,

@@ -32,7 +32,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -170,7 +170,7 @@ class AntTask:
             reset_noise_scale=reset_scale,
             ctrl_cost_weight=CONTROL_WEIGHTS[self.reward],
         )
-        return _simulation(ant_gymnasium, world, compiled=False, owner=None)
+        return Simulation.of(ant_gymnasium, world, compiled=False)
 
     def _open_compiled(self, patience: int, reset_scale: float) -> Simulation:
         from exneat_cli.tasks import ant_dynamics
@@ -204,19 +204,7 @@ class AntTask:
             clock=np.zeros(3, dtype=np.int64),
             mark=np.zeros(1),
         )
-        return _simulation(ant_dynamics, world, compiled=True, owner=(model, data))
-
-
-def _simulation(functions: Any, world: object, *, compiled: bool, owner: object) -> Simulation:
-    return Simulation(
-        world=world,
-        reset=functions.reset,
-        observe=functions.observe,
-        step=functions.step,
-        locate=functions.locate,
-        compiled=compiled,
-        owner=owner,
-    )
+        return Simulation.of(ant_dynamics, world, owner=(model, data))
 
 
 @functools.cache

@@ -17,7 +17,7 @@ from typing import ClassVar
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
 from exneat_cli.tasks import maze_dynamics
 from exneat_cli.tasks.grid import GridTask
-from exneat_cli.tasks.maze_dynamics import Maze, new_maze
+from exneat_cli.tasks.maze_dynamics import new_maze
 from exneat_cli.tasks.task import Simulation
 
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
@@ -70,7 +70,7 @@ class TrackMaze(_MazeTask):
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new track; neither argument matters here."""
         maze = new_maze(self.size, gap=self.gap, cue_noise=self.cue_noise, time_share=TIME_SHARES[self.fitness])
-        return _simulation(maze, maze_dynamics.reset_track)
+        return Simulation.of(maze_dynamics, maze, reset=maze_dynamics.reset_track)
 
 
 @dataclass(frozen=True)
@@ -113,15 +113,4 @@ class GeneralMaze(_MazeTask):
             walls_removed=self.walls_removed,
             time_share=TIME_SHARES[self.fitness],
         )
-        return _simulation(maze, maze_dynamics.reset_general)
-
-
-def _simulation(maze: Maze, reset: object) -> Simulation:
-    return Simulation(
-        world=maze,
-        reset=reset,  # type: ignore[arg-type]
-        observe=maze_dynamics.observe,
-        step=maze_dynamics.step,
-        locate=maze_dynamics.locate,
-        compiled=True,
-    )
+        return Simulation.of(maze_dynamics, maze, reset=maze_dynamics.reset_general)

@@ -71,7 +71,7 @@ class Foraging(GridTask):
 
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new field; neither argument matters here."""
-        return _simulation(self._field(motion=0.0, levy=False))
+        return Simulation.of(prey_dynamics, self._field(motion=0.0, levy=False))
 
     def _field(self, *, motion: float, levy: bool) -> Field:
         return new_field(
@@ -113,15 +113,4 @@ class Hunting(Foraging):
 
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new field; neither argument matters here."""
-        return _simulation(self._field(motion=self.p_m, levy=self.motion == "levy"))
-
-
-def _simulation(field: Field) -> Simulation:
-    return Simulation(
-        world=field,
-        reset=prey_dynamics.reset,
-        observe=prey_dynamics.observe,
-        step=prey_dynamics.step,
-        locate=prey_dynamics.locate,
-        compiled=True,
-    )
+        return Simulation.of(prey_dynamics, self._field(motion=self.p_m, levy=self.motion == "levy"))

@@ -60,6 +60,19 @@ class Simulation:
     compiled: bool
     owner: object = None
 
+    @classmethod
+    def of(cls, functions: Any, world: object, *, compiled: bool = True, **others: Any) -> Simulation:
+        """A simulation whose functions are those of a module or namespace, unless `others` names one.
+
+        Args:
+            functions: has `reset`, `observe`, `step` and `locate`.
+            world: the storage they work on.
+            compiled: whether they are compiled.
+            others: replace single fields, e.g. `reset` or `owner`.
+        """
+        named = {name: getattr(functions, name, None) for name in ("reset", "observe", "step", "locate")}
+        return cls(world=world, compiled=compiled, **{**named, **others})
+
 
 class Task(Protocol):
     """A task's parameters, and what follows from them."""

@@ -10,7 +10,7 @@ import pytest
 
 from exneat_cli.brains import RandomActions, motionless
 from exneat_cli.rollouts import Executor, Job, Noise, Outcome, Runner
-from exneat_cli.rollouts.episode import _episode
+from exneat_cli.rollouts.episode import Conditions, _episode
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import shared_episodes, stream, training_episodes
 from exneat_cli.tasks import ENDED, RUNNING, TASKS, Task
@@ -117,7 +117,8 @@ def test_what_a_brain_receives_lies_within_the_limits_however_strong_the_noise(t
     totals, trace = np.zeros(len(task.terms)), np.zeros((0, 0))
     rngs = [np.random.default_rng(k) for k in range(3)]
     limits = task.observation_limits
-    loop(simulation.world, None, *rngs, 5.0, *limits, task.tie_noise, observation, action, totals, trace, 0)
+    conditions = Conditions(5.0, *limits, tie_noise=task.tie_noise)
+    loop(simulation.world, None, *rngs, conditions, observation, action, totals, trace, 0)
     seen = np.array(received)
     assert limits[0] <= seen.min() < seen.max() <= limits[1]
     assert seen.std() > 0.1
