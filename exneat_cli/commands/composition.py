@@ -95,14 +95,13 @@ def _flags_first(program: str, arguments: Sequence[str]) -> tuple[list[str], lis
     overrides: list[str] = []
     waiting = iter(arguments)
     for argument in waiting:
-        name, separator, _ = argument.partition("=")
+        name, separator, joined = argument.partition("=")
         if not argument.startswith("-"):
             overrides.append(argument)
         elif name in _FLAGS and not separator:
             flags.append(argument)
         elif name in _FLAGS_WITH_VALUE:
-            value = [] if separator else [next(waiting, "")]
-            given = argument.partition("=")[2] if separator else value[0]
+            given = joined if separator else next(waiting, "")
             if not given:
                 raise ExneatError(f"{argument}: expected a value after it, got nothing")
             flags += [name, _checked_flag(name, given)]

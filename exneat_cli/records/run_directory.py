@@ -131,11 +131,12 @@ class RunDirectory:
         except OSError as error:
             raise ExneatError(f"{self.path}: cannot be opened: {error.strerror}") from error
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                process = self.read_manifest().get("process", "unknown") if self.manifest.exists() else "unknown"
+                raise ExneatError(f"{self.path}: another process is writing this run (process id {process})") from None
             yield
-        except BlockingIOError:
-            process = self.read_manifest().get("process", "unknown") if self.manifest.exists() else "unknown"
-            raise ExneatError(f"{self.path}: another process is writing this run (process id {process})") from None
         finally:
             os.close(descriptor)
 

@@ -105,7 +105,6 @@ class Runner:
 
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
         self._task = task
-        self._noise = noise
         self._loops: dict[type[Any], Callable[..., Any]] = {}
         self._stop = threading.Event()
         self._pool = ThreadPoolExecutor(executor.threads, thread_name_prefix="episodes")
@@ -133,7 +132,6 @@ class Runner:
         starts = {key: _generator_states(seeds) for key, seeds in episodes.items()}
         outcomes: list[Outcome | None] = [None] * len(jobs)
         positions = itertools.count()
-
         failed = threading.Event()
 
         def work(booth: _Booth) -> None:
@@ -152,6 +150,11 @@ class Runner:
         for worker in workers:
             worker.result()
         return [outcome for outcome in outcomes if outcome is not None]
+
+    def run_each(self, brains: Sequence[Brain], episodes: Sequence[EpisodeSeeds]) -> list[list[Outcome]]:
+        """The outcomes of every brain, in the order of the brains, in all of the same episodes."""
+        outcomes = self.run([Job(brain, seeds) for brain in brains for seeds in episodes])
+        return [outcomes[k * len(episodes) : (k + 1) * len(episodes)] for k in range(len(brains))]
 
     def trace(self, job: Job) -> Trace:
         """The path of one episode, and the world that it went through."""

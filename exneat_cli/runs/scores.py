@@ -52,9 +52,7 @@ def score(outcomes: Sequence[Outcome]) -> Score:
 
 def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes: int) -> list[Score]:
     """Scores of several brains on the same ``"validation"`` or ``"test"`` episodes, side by side."""
-    seeds = shared_episodes(purpose, episodes)
-    outcomes = runner.run([Job(brain, seed) for brain in brains for seed in seeds])
-    return [score(outcomes[k * episodes : (k + 1) * episodes]) for k in range(len(brains))]
+    return [score(outcomes) for outcomes in runner.run_each(brains, shared_episodes(purpose, episodes))]
 
 
 def baseline_jobs(task: Task, algorithm: str, root: int, episodes: int) -> list[Job]:

@@ -13,7 +13,7 @@ from exneat_cli.brains import assemble
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, neat_config
 from exneat_cli.records import HistoryRow
-from exneat_cli.rollouts import Job, Outcome, Runner
+from exneat_cli.rollouts import Outcome, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import stream, training_episodes
 
@@ -102,8 +102,7 @@ class _Training:
         seeds = training_episodes(settings.seed, generation, settings.episodes)
         feed_forward = settings.evolution.feed_forward
         brains = [assemble(self._plan, team.genomes, feed_forward=feed_forward) for team in teams]
-        outcomes = self._runner.run([Job(brain, seed) for brain in brains for seed in seeds])
-        return [outcomes[k * len(seeds) : (k + 1) * len(seeds)] for k in range(len(teams))]
+        return self._runner.run_each(brains, seeds)
 
     def _team_fitness(self, episodes: Sequence[Outcome]) -> float:
         if any(outcome.failed for outcome in episodes):

@@ -6,6 +6,7 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 import gymnasium
 
 from exneat_cli.tasks.ant import AntTask
+from exneat_cli.tasks.grid_environment import WORLDS
 from exneat_cli.tasks.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Sector, Simulation, Task
@@ -19,12 +20,8 @@ TASKS: dict[str, type[Task]] = {
 }
 """Every task by the name it has in `conf/task`."""
 
-for _world in ("TrackMaze", "GeneralMaze", "Foraging", "Hunting"):
-    gymnasium.register(
-        id=f"exneat/{_world}-v0",
-        entry_point="exneat_cli.tasks.grid_environment:GridEnvironment",
-        kwargs={"world": f"exneat/{_world}-v0"},
-    )
+for _id in WORLDS:
+    gymnasium.register(id=_id, entry_point="exneat_cli.tasks.grid_environment:GridEnvironment", kwargs={"world": _id})
 
 __all__ = [
     "ENDED",
