@@ -2,7 +2,6 @@
 
 from exneat_cli.brains.assembly import assemble
 from exneat_cli.brains.brain import Brain
-from exneat_cli.brains.random_actions import RandomActions
-from exneat_cli.brains.rules import linear_fusion, motionless
+from exneat_cli.brains.rules import RandomActions, linear_fusion, motionless
 
 __all__ = ["Brain", "RandomActions", "assemble", "linear_fusion", "motionless"]

@@ -1,4 +1,4 @@
-"""A whole brain as flat arrays, and the compiled kernel that runs it.
+"""Whole brains as flat arrays, and the compiled kernel that runs them.
 
 All values live in one vector: the observation first, then the nodes of every module, then a copy of what
 links read (feed-forward brains), then a slot that stays 0. Semantics are those of neat-python's networks,
@@ -8,13 +8,13 @@ weights and order of summation included.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.tasks.compiling import compiled_lean
 
 ACTIVATION_CODES = {"tanh": 0, "relu": 1, "sigmoid": 2, "identity": 3}
 """neat-python's name of an activation -> its number in the kernel."""
@@ -57,47 +57,93 @@ def sizes(brain: Brain) -> tuple[int, int]:
     return brain.observation_size, len(brain.output_slot)
 
 
-@compiled
-def fresh_memory(brain: Brain) -> NDArray[np.float64]:
-    """The value vector at an episode's start, (size,), plus a scratch entry per node."""
-    return np.zeros(brain.size + brain.node_slot.size)
+class Brains(NamedTuple):
+    """Several brains for one task, laid end to end, so that one compiled call can run them all.
+
+    Attributes:
+        size, recurrent: (B,) of each brain.
+        first_node, first_link: (B + 1,) the nodes of brain b are first_node[b] to first_node[b + 1], and so on.
+        node_slot, edge_start, edge_source, edge_weight, bias, response, activation: as in `Brain`, nodes and
+            edges counted through.
+        link_slot, link_source: as in `Brain`, counted through.
+        output_slot: (B, A).
+    """
+
+    size: NDArray[np.int64]
+    recurrent: NDArray[np.bool_]
+    first_node: NDArray[np.int64]
+    first_link: NDArray[np.int64]
+    node_slot: NDArray[np.int64]
+    edge_start: NDArray[np.int64]
+    edge_source: NDArray[np.int64]
+    edge_weight: NDArray[np.float64]
+    bias: NDArray[np.float64]
+    response: NDArray[np.float64]
+    activation: NDArray[np.int64]
+    link_slot: NDArray[np.int64]
+    link_source: NDArray[np.int64]
+    output_slot: NDArray[np.int64]
 
 
-@compiled
-def activate(
-    brain: Brain,
-    memory: NDArray[np.float64],
-    observation: NDArray[np.float64],
-    action: NDArray[np.float64],
-    rng: Generator,
-) -> None:
-    """One step: read `observation`, advance `memory`, write `action`.
+def lay_out(brains: Sequence[Brain]) -> Brains:
+    """All of `brains`, at least one, end to end."""
+
+    def joined(field: str) -> NDArray[Any]:
+        return np.concatenate([getattr(brain, field) for brain in brains])
+
+    edges = np.cumsum([0] + [len(brain.edge_source) for brain in brains])
+    starts = [brain.edge_start[:-1] + first for brain, first in zip(brains, edges[:-1], strict=True)]
+    return Brains(
+        size=np.array([brain.size for brain in brains], np.int64),
+        recurrent=np.array([brain.recurrent for brain in brains]),
+        first_node=np.cumsum([0] + [len(brain.node_slot) for brain in brains]),
+        first_link=np.cumsum([0] + [len(brain.link_slot) for brain in brains]),
+        node_slot=joined("node_slot"),
+        edge_start=np.concatenate([*starts, edges[-1:]]),
+        edge_source=joined("edge_source"),
+        edge_weight=joined("edge_weight"),
+        bias=joined("bias"),
+        response=joined("response"),
+        activation=joined("activation"),
+        link_slot=joined("link_slot"),
+        link_source=joined("link_source"),
+        output_slot=np.stack([brain.output_slot for brain in brains]),
+    )
+
+
+def memory_size(brains: Brains) -> int:
+    """Room for the value vector of any of `brains` and a scratch entry for each of its nodes."""
+    return int(np.max(brains.size + np.diff(brains.first_node)))
+
+
+@compiled_lean
+def activate(brains: Brains, b: int, memory: NDArray[np.float64], action: NDArray[np.float64]) -> None:
+    """One step of brain `b`: advance `memory` and write `action`.
 
     Args:
-        brain: see there.
-        memory: what `fresh_memory` gave, carried through the episode.
-        observation: (observation size,).
+        brains: see there.
+        b: which of them.
+        memory: (`memory_size`,), all 0 when an episode starts; its head is the observation of this step.
         action: (A,), overwritten.
-        rng: what chance in the choice of actions draws from; networks leave nothing to chance.
     """
-    for i in range(observation.size):
-        memory[i] = observation[i]
-    for i in range(brain.link_slot.size):
-        memory[brain.link_slot[i]] = memory[brain.link_source[i]]
-    for node in range(brain.node_slot.size):
+    for i in range(brains.first_link[b], brains.first_link[b + 1]):
+        memory[brains.link_slot[i]] = memory[brains.link_source[i]]
+    first, last = brains.first_node[b], brains.first_node[b + 1]
+    recurrent, scratch = brains.recurrent[b], brains.size[b] - first
+    for node in range(first, last):
         total = 0.0
-        for edge in range(brain.edge_start[node], brain.edge_start[node + 1]):
-            total += memory[brain.edge_source[edge]] * brain.edge_weight[edge]
-        value = _activation(brain.activation[node], brain.bias[node] + brain.response[node] * total)
-        memory[brain.size + node if brain.recurrent else brain.node_slot[node]] = value
-    if brain.recurrent:
-        for node in range(brain.node_slot.size):
-            memory[brain.node_slot[node]] = memory[brain.size + node]
+        for edge in range(brains.edge_start[node], brains.edge_start[node + 1]):
+            total += memory[brains.edge_source[edge]] * brains.edge_weight[edge]
+        value = _activation(brains.activation[node], brains.bias[node] + brains.response[node] * total)
+        memory[scratch + node if recurrent else brains.node_slot[node]] = value
+    if recurrent:
+        for node in range(first, last):
+            memory[brains.node_slot[node]] = memory[scratch + node]
     for i in range(action.size):
-        action[i] = memory[brain.output_slot[i]]
+        action[i] = memory[brains.output_slot[b, i]]
 
 
-@compiled
+@compiled_lean
 def _activation(code, value):  # type: ignore[no-untyped-def]
     if code == 0:
         return math.tanh(max(-60.0, min(60.0, 2.5 * value)))

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains.brain import ACTIVATION_CODES, Brain
 from exneat_cli.tasks import Sector
+
+
+class RandomActions(NamedTuple):
+    """Acts at random, whatever it senses: uniform between `low` and `high`, (A,) each."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brain:

@@ -1,6 +1,6 @@
 """The hot room: runs episodes and returns what came out of them; writes nothing."""
 
 from exneat_cli.rollouts.noise import Noise
-from exneat_cli.rollouts.runner import EXECUTORS, Executor, Job, Outcome, Runner, Trace
+from exneat_cli.rollouts.runner import EXECUTORS, Executor, Outcomes, Runner, Trace
 
-__all__ = ["EXECUTORS", "Executor", "Job", "Noise", "Outcome", "Runner", "Trace"]
+__all__ = ["EXECUTORS", "Executor", "Noise", "Outcomes", "Runner", "Trace"]

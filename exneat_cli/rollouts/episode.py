@@ -10,11 +10,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions, brain, random_actions
+from exneat_cli.brains.brain import activate
 from exneat_cli.tasks import RUNNING, Simulation
-from exneat_cli.tasks.compiling import compiled, with_functions
-
-_BRAIN_FUNCTIONS = {Brain: brain, RandomActions: random_actions}
+from exneat_cli.tasks.compiling import compiled_lean, with_functions
 
 
 class Conditions(NamedTuple):
@@ -23,103 +21,150 @@ class Conditions(NamedTuple):
     Attributes:
         sensor_std: sd of the noise on every input; 0 draws nothing.
         lowest, highest: noisy inputs are clipped to these, unless `highest` is infinite.
-        tie_noise: U(0, tie_noise) is added to each entry of the action; 0 draws nothing.
+        action_low, action_span: (A,) action_low + U(0, action_span) is added to the action; draws nothing if
+            all are 0.
     """
 
     sensor_std: float
     lowest: float
     highest: float
-    tie_noise: float
+    action_low: NDArray[np.float64]
+    action_span: NDArray[np.float64]
 
 
-def _episode(  # type: ignore[no-untyped-def]
+class Buffers(NamedTuple):
+    """What one thread writes into while episodes run; nothing in it outlives a call.
+
+    Attributes:
+        memory: value vector of the largest brain, and a scratch entry per node.
+        action: (A,).
+        terms: (terms,) of one step.
+        sensor_noise: (longest episode, observation size) sensor noise, or no columns without any.
+        action_noise: (longest episode, A) what is added to the action, or no columns if nothing is.
+    """
+
+    memory: NDArray[np.float64]
+    action: NDArray[np.float64]
+    terms: NDArray[np.float64]
+    sensor_noise: NDArray[np.float64]
+    action_noise: NDArray[np.float64]
+
+
+def _episodes(  # type: ignore[no-untyped-def]
     world,
-    agent,
+    brains,
+    first: int,
+    last: int,
     world_rng: Generator,
     noise_rng: Generator,
     action_rng: Generator,
     conditions: Conditions,
-    observation: NDArray[np.float64],
-    action: NDArray[np.float64],
+    buffers: Buffers,
+    observation_size: int,
+    halt: NDArray[np.bool_],
+    status: NDArray[np.int64],
+    steps: NDArray[np.int64],
     totals: NDArray[np.float64],
     trace: NDArray[np.float64],
     located: int,
-):
-    """Run one episode; returns how it ended and how many steps it took.
+) -> None:
+    """Draw one world and run some brains through it, one after another, each from its start.
 
-    The names reset, observe, step, locate, fresh_memory and activate are bound by `episode_loop`.
+    Noise is drawn when the first brain needs it and kept for the others: all of them face the same.
+    The names reset, restart, observe, step and locate are bound by `episode_loop`.
 
     Args:
         world: the task's storage.
-        agent: a brain.
+        brains: of a population.
+        first: brain to run.
+        last: brain before which to stop.
         world_rng: draws the world.
         noise_rng: draws the sensor noise, in the order of the inputs.
-        action_rng: draws what the agent leaves to chance.
+        action_rng: draws what is added to the action.
         conditions: what happens to inputs and actions on their way.
-        observation: buffer, (observation size,).
-        action: buffer, (action size,).
-        totals: (terms,), overwritten with the sums of the reward terms.
+        buffers: to write into.
+        observation_size: entries of the observation.
+        halt: (1,), set by another thread to stop before the next brain.
+        status: (B,), overwritten with how the episodes ended.
+        steps: (B,), overwritten with how many steps they took.
+        totals: (B, terms), overwritten with the sums of the reward terms.
         trace: (steps + 1, located + terms) to record the path; rows that it lacks are left out.
         located: how many columns of `trace` say where the agent is; the terms follow.
     """
-    terms = np.zeros(totals.size)
-    totals[:] = 0.0
+    memory, action, terms = buffers.memory, buffers.action, buffers.terms
+    sensor_noise, action_noise = buffers.sensor_noise, buffers.action_noise
+    clipped = conditions.highest < np.inf
+    drawn = 0
+    observation = memory[:observation_size]
     reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
-    memory = fresh_memory(agent)  # type: ignore[name-defined]  # noqa: F821
-    if trace.shape[0] > 0:
-        locate(world, trace[0, :located])  # type: ignore[name-defined]  # noqa: F821
-    steps = 0
-    status = RUNNING
-    while status == RUNNING:
-        observe(world, observation)  # type: ignore[name-defined]  # noqa: F821
-        if conditions.sensor_std > 0.0:
-            for i in range(observation.size):
-                observation[i] += noise_rng.normal(0.0, conditions.sensor_std)
-        if conditions.highest < np.inf:
-            for i in range(observation.size):
-                observation[i] = min(max(observation[i], conditions.lowest), conditions.highest)
-        activate(agent, memory, observation, action, action_rng)  # type: ignore[name-defined]  # noqa: F821
-        if conditions.tie_noise > 0.0:
-            for i in range(action.size):
-                action[i] += action_rng.uniform(0.0, conditions.tie_noise)
-        status = step(world, action, world_rng, terms)  # type: ignore[name-defined]  # noqa: F821
-        for i in range(terms.size):
-            totals[i] += terms[i]
-        steps += 1
-        if steps < trace.shape[0]:
-            locate(world, trace[steps, :located])  # type: ignore[name-defined]  # noqa: F821
-            trace[steps, located:] = terms
-    return status, steps
+    for b in range(first, last):
+        if halt[0]:
+            return
+        if b > first:
+            restart(world)  # type: ignore[name-defined]  # noqa: F821
+        memory[:] = 0.0
+        totals[b] = 0.0
+        if trace.shape[0] > 0:
+            locate(world, trace[0, :located])  # type: ignore[name-defined]  # noqa: F821
+        t = 0
+        ended = RUNNING
+        while ended == RUNNING:
+            if t == drawn:
+                _draw(conditions, sensor_noise[t], action_noise[t], noise_rng, action_rng)
+                drawn += 1
+            observe(world, observation)  # type: ignore[name-defined]  # noqa: F821
+            for i in range(sensor_noise.shape[1]):
+                observation[i] += sensor_noise[t, i]
+            if clipped:
+                for i in range(observation_size):
+                    observation[i] = min(max(observation[i], conditions.lowest), conditions.highest)
+            activate(brains, b, memory, action)
+            for i in range(action_noise.shape[1]):
+                action[i] += action_noise[t, i]
+            ended = step(world, action, terms)  # type: ignore[name-defined]  # noqa: F821
+            for i in range(terms.size):
+                totals[b, i] += terms[i]
+            t += 1
+            if t < trace.shape[0]:
+                locate(world, trace[t, :located])  # type: ignore[name-defined]  # noqa: F821
+                for i in range(terms.size):
+                    trace[t, located + i] = terms[i]
+        status[b] = ended
+        steps[b] = t
 
 
-def episode_loop(simulation: Simulation, brain_type: type[Any], task: str) -> Callable[..., Any]:
-    """The loop for one kind of world and brain: compiled if the world is, else plain Python."""
-    functions = _BRAIN_FUNCTIONS[brain_type]
+@compiled_lean
+def _draw(conditions, sensor_noise, action_noise, noise_rng, action_rng):  # type: ignore[no-untyped-def]
+    for i in range(sensor_noise.size):
+        sensor_noise[i] = noise_rng.normal(0.0, conditions.sensor_std)
+    for i in range(action_noise.size):
+        action_noise[i] = conditions.action_low[i] + conditions.action_span[i] * action_rng.random()
+
+
+def episode_loop(simulation: Simulation, task: str) -> Callable[..., Any]:
+    """The loop for one kind of world: compiled if the world is, else plain Python."""
     return _bind(
         task,
-        brain_type.__name__,
         simulation.reset,
+        simulation.restart,
         simulation.observe,
         simulation.step,
         simulation.locate,
-        functions.fresh_memory,
-        functions.activate,
         simulation.compiled,
     )
 
 
 @functools.cache
 def _bind(  # type: ignore[no-untyped-def]
-    task: str, brain_name: str, reset, observe, step, locate, fresh_memory, activate, compile_it: bool
+    task: str, reset, restart, observe, step, locate, compile_it: bool
 ) -> Callable[..., Any]:
     loop = with_functions(
-        _episode,
-        f"episode_of_{task}_with_{brain_name}",
+        _episodes,
+        f"episodes_of_{task}",
         reset=reset,
+        restart=restart,
         observe=observe,
         step=step,
         locate=locate,
-        fresh_memory=fresh_memory,
-        activate=activate,
     )
-    return compiled(loop) if compile_it else loop
+    return compiled_lean(loop) if compile_it else loop

@@ -1,33 +1,32 @@
 """Runs episodes on threads: the compiled loop holds no GIL, so they run side by side.
 
-Every episode draws from generators of its own and starts in a reset world, so results depend neither on
+Every episode draws from generators of its own and starts in a fresh world, so results depend neither on
 the number of workers nor on which of them ran what.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.random import PCG64, Generator
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions
-from exneat_cli.brains.brain import sizes
+from exneat_cli.brains import Brain, RandomActions, motionless
+from exneat_cli.brains.brain import Brains, lay_out, memory_size, sizes
 from exneat_cli.errors import check_choice, check_whole
-from exneat_cli.rollouts.episode import Conditions, episode_loop
+from exneat_cli.rollouts.episode import Buffers, Conditions, episode_loop
 from exneat_cli.rollouts.noise import Noise
-from exneat_cli.seeding import EpisodeSeeds
+from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import FAILED, Simulation, Task
 
 EXECUTORS = ("threads", "serial")
+PIECES_AHEAD = 4
+"""A thread takes this part of its fair share of what is left."""
 
 
 @dataclass(frozen=True)
@@ -57,27 +56,20 @@ class Executor:
         return self.workers or _usable_cores()
 
 
-class Job(NamedTuple):
-    """One brain in one episode."""
-
-    brain: Brain | RandomActions
-    seeds: EpisodeSeeds
-
-
-class Outcome(NamedTuple):
-    """What one episode gave.
+class Outcomes(NamedTuple):
+    """What B brains got in E episodes.
 
     Attributes:
-        fitness: the task's fitness; its failure floor if the episode failed.
-        full_reward: the task's second figure; the failure floor likewise.
-        steps: control steps done.
-        failed: whether physics or network exploded.
+        fitness: (B, E) the task's fitness; its failure floor where an episode failed.
+        full_reward: (B, E) the task's second figure; the failure floor likewise.
+        steps: (B, E) control steps done.
+        failed: (B, E) whether physics or network exploded.
     """
 
-    fitness: float
-    full_reward: float
-    steps: int
-    failed: bool
+    fitness: NDArray[np.float64]
+    full_reward: NDArray[np.float64]
+    steps: NDArray[np.int64]
+    failed: NDArray[np.bool_]
 
 
 class Trace(NamedTuple):
@@ -105,124 +97,167 @@ class Runner:
 
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
         self._task = task
-        self._loops: dict[type[Any], Callable[..., Any]] = {}
-        self._stop = threading.Event()
+        self._noise = noise
+        self._halt = np.zeros(1, dtype=np.bool_)
         self._pool = ThreadPoolExecutor(executor.threads, thread_name_prefix="episodes")
-        self._booths = [
-            _Booth(task, noise, task.open(training=training, reset_scale=noise.reset_scale))
-            for _ in range(executor.threads)
+        self._simulations = [
+            task.open(training=training, reset_scale=noise.reset_scale) for _ in range(executor.threads)
         ]
-        self.compiled = self._booths[0].simulation.compiled
+        self._loop = episode_loop(self._simulations[0], task.name)
+        self.compiled = self._simulations[0].compiled
 
     def __enter__(self) -> Runner:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._stop.set()
+        self._halt[0] = True
         self._pool.shutdown(cancel_futures=True)
 
-    def run(self, jobs: Sequence[Job]) -> list[Outcome]:
-        """Outcomes in the order of the jobs.
+    def run(self, brains: Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
+        """Outcomes of every brain (one, if it acts at random) in every episode.
 
         Raises:
-            ValueError: a brain was wired for other sizes of observation or action.
+            ValueError: there is no brain, or one was wired for other sizes of observation or action.
         """
-        self._prepare(jobs)
-        episodes = {id(job.seeds): job.seeds for job in jobs}
-        starts = {key: _generator_states(seeds) for key, seeds in episodes.items()}
-        outcomes: list[Outcome | None] = [None] * len(jobs)
-        positions = itertools.count()
+        crew = self._crew(brains)
+        results = _Results.empty(len(crew.brains.size), len(episodes), len(self._task.terms))
+        pieces = _Pieces(len(crew.brains.size), len(episodes), len(self._simulations))
         failed = threading.Event()
 
-        def work(booth: _Booth) -> None:
+        def work(simulation: Simulation) -> None:
             try:
-                while (k := next(positions)) < len(jobs) and not (self._stop.is_set() or failed.is_set()):
-                    job = jobs[k]
-                    outcomes[k] = booth.run(self._loops[type(job.brain)], job.brain, starts[id(job.seeds)])
+                while not failed.is_set() and (piece := pieces.take()) is not None:
+                    episode, first, last = piece
+                    self._play(simulation, crew, (first, last), episodes[episode], results.of_episode(episode))
             except BaseException:
                 failed.set()
                 raise
 
-        # Each thread takes the next job when it is free: episodes differ in length, and a future each costs
-        # more than a short one.
-        workers = [self._pool.submit(work, booth) for booth in self._booths]
+        workers = [self._pool.submit(work, simulation) for simulation in self._simulations]
         wait(workers)
         for worker in workers:
             worker.result()
-        return [outcome for outcome in outcomes if outcome is not None]
+        return self._outcomes(results)
 
-    def run_each(self, brains: Sequence[Brain], episodes: Sequence[EpisodeSeeds]) -> list[list[Outcome]]:
-        """The outcomes of every brain, in the order of the brains, in all of the same episodes."""
-        outcomes = self.run([Job(brain, seeds) for brain in brains for seeds in episodes])
-        return [outcomes[k * len(episodes) : (k + 1) * len(episodes)] for k in range(len(brains))]
-
-    def trace(self, job: Job) -> Trace:
+    def trace(self, brain: Brain | RandomActions, seeds: EpisodeSeeds) -> Trace:
         """The path of one episode, and the world that it went through."""
-        self._prepare([job])
-        booth, loop = self._booths[0], self._loops[type(job.brain)]
-        states = _generator_states(job.seeds)
+        crew = self._crew([brain] if isinstance(brain, Brain) else brain)
+        simulation, results = self._simulations[0], _Results.empty(1, 1, len(self._task.terms))
         columns = len(self._task.trace_columns) + len(self._task.terms)
-        steps = np.zeros((booth.run(loop, job.brain, states).steps + 1, columns))
-        booth.run(loop, job.brain, states, steps)
-        return Trace(steps, self._task.tiles(booth.simulation.world))
+        self._play(simulation, crew, (0, 1), seeds, results.of_episode(0))
+        steps = np.zeros((int(results.steps[0, 0]) + 1, columns))
+        self._play(simulation, crew, (0, 1), seeds, results.of_episode(0), steps)
+        return Trace(steps, self._task.tiles(simulation.world))
 
-    def _prepare(self, jobs: Sequence[Job]) -> None:
-        """Refuse brains that compiled code would let read and write elsewhere, and bind every loop."""
-        expected = self._task.observation_size, len(self._task.actuator_names)
-        for brain in {id(job.brain): job.brain for job in jobs}.values():
-            fits = sizes(brain) == expected if isinstance(brain, Brain) else len(brain.low) == expected[1]
-            if not fits:
-                raise ValueError(f"a brain for another task: expected sizes {expected} of observation and action")
-        for brain_type in {type(job.brain) for job in jobs} - set(self._loops):
-            self._loops[brain_type] = episode_loop(self._booths[0].simulation, brain_type, self._task.name)
-
-
-class _Booth:
-    """What one thread needs to run episodes: a world, three generators, and buffers to reuse."""
-
-    def __init__(self, task: Task, noise: Noise, simulation: Simulation) -> None:
-        self.simulation = simulation
-        self._task = task
-        self._generators = [Generator(PCG64(0)) for _ in EpisodeSeeds._fields]
+    def _crew(self, brains: Sequence[Brain] | RandomActions) -> _Crew:
+        """Brains end to end; refuses those that compiled code would let read and write elsewhere."""
+        task = self._task
+        actions = len(task.actuator_names)
+        low, high = np.zeros(actions), np.full(actions, task.tie_noise)
+        if isinstance(brains, RandomActions):
+            low, high = brains
+            brains = [motionless(task.observation_size, np.zeros(len(low)))]
+        if not brains or any(sizes(brain) != (task.observation_size, actions) for brain in brains):
+            expected = f"{task.observation_size} inputs and {actions} actions"
+            raise ValueError(f"brains: expected at least one, each for {expected} of {task.name}")
         lowest, highest = task.observation_limits
-        self._conditions = Conditions(float(noise.sensor_std), float(lowest), float(highest), float(task.tie_noise))
-        self._observation = np.zeros(task.observation_size)
-        self._action = np.zeros(len(task.actuator_names))
-        self._totals = np.zeros(len(task.terms))
-        self._no_trace = np.zeros((0, len(task.trace_columns) + len(task.terms)))
-        self._located = len(task.trace_columns)
+        conditions = Conditions(float(self._noise.sensor_std), float(lowest), float(highest), low, high - low)
+        return _Crew(lay_out(brains), conditions)
 
-    def run(
-        self,
-        loop: Callable[..., Any],
-        brain: Brain | RandomActions,
-        states: Sequence[dict[str, Any]],
-        trace: NDArray[np.float64] | None = None,
-    ) -> Outcome:
-        """One episode, with the generators put to `states` first."""
-        for rng, state in zip(self._generators, states, strict=True):
-            rng.bit_generator.state = state
-        status, steps = loop(
-            self.simulation.world,
-            brain,
-            *self._generators,
-            self._conditions,
-            self._observation,
-            self._action,
-            self._totals,
-            self._no_trace if trace is None else trace,
-            self._located,
+    def _buffers(self, crew: _Crew) -> Buffers:
+        conditions, steps = crew.conditions, self._task.longest_episode
+        shaken = bool(conditions.action_low.any() or conditions.action_span.any())
+        return Buffers(
+            memory=np.zeros(memory_size(crew.brains)),
+            action=np.zeros(len(conditions.action_low)),
+            terms=np.zeros(len(self._task.terms)),
+            sensor_noise=np.zeros((steps, self._task.observation_size if conditions.sensor_std > 0.0 else 0)),
+            action_noise=np.zeros((steps, len(conditions.action_low) if shaken else 0)),
         )
-        task, totals = self._task, self._totals
-        fitness, full_reward = task.fitness_of(totals), task.full_reward_of(totals)
-        if status == FAILED or not (math.isfinite(fitness) and math.isfinite(full_reward)):
-            return Outcome(task.failure_floor, task.failure_floor, int(steps), True)
-        return Outcome(fitness, full_reward, int(steps), False)
+
+    def _play(
+        self,
+        simulation: Simulation,
+        crew: _Crew,
+        chosen: tuple[int, int],
+        seeds: EpisodeSeeds,
+        results: _Results,
+        trace: NDArray[np.float64] | None = None,
+    ) -> None:
+        located = len(self._task.trace_columns)
+        self._loop(
+            simulation.world,
+            crew.brains,
+            *chosen,
+            *(generator(seed) for seed in seeds),
+            crew.conditions,
+            self._buffers(crew),
+            self._task.observation_size,
+            self._halt,
+            results.status,
+            results.steps,
+            results.totals,
+            np.zeros((0, located + len(self._task.terms))) if trace is None else trace,
+            located,
+        )
+
+    def _outcomes(self, results: _Results) -> Outcomes:
+        task = self._task
+        with np.errstate(invalid="ignore"):
+            fitness, full_reward = task.fitness_of(results.totals).T, task.full_reward_of(results.totals).T
+        failed = (results.status.T == FAILED) | ~np.isfinite(fitness) | ~np.isfinite(full_reward)
+        floor = task.failure_floor
+        return Outcomes(np.where(failed, floor, fitness), np.where(failed, floor, full_reward), results.steps.T, failed)
 
 
-def _generator_states(seeds: EpisodeSeeds) -> list[dict[str, Any]]:
-    """Where the generators of an episode start; setting a state is cheaper than making a generator."""
-    return [dict(PCG64(seed).state) for seed in seeds]
+class _Crew(NamedTuple):
+    """Who acts, and what happens to its inputs and actions."""
+
+    brains: Brains
+    conditions: Conditions
+
+
+class _Results(NamedTuple):
+    """What the loop writes: how episodes ended, their steps and the sums of their terms, (E, B, ...) each."""
+
+    status: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    totals: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, brains: int, episodes: int, terms: int) -> _Results:
+        shape = (episodes, brains)
+        return cls(np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros((*shape, terms)))
+
+    def of_episode(self, episode: int) -> _Results:
+        return _Results(*(values[episode] for values in self))
+
+
+class _Pieces:
+    """Shares work out: episode by episode, in pieces that shrink towards the end.
+
+    A piece is some brains in one episode. Large ones spare calls and the drawing of worlds; small last ones
+    let all threads end together (guided self-scheduling; Polychronopoulos and Kuck, 1987).
+    """
+
+    def __init__(self, brains: int, episodes: int, threads: int) -> None:
+        self._brains = brains
+        self._total = brains * episodes
+        self._threads = threads
+        self._taken = 0
+        self._lock = threading.Lock()
+
+    def take(self) -> tuple[int, int, int] | None:
+        """The next episode, its first brain and the one after its last; None when all are taken."""
+        with self._lock:
+            left = self._total - self._taken
+            if left == 0:
+                return None
+            episode, first = divmod(self._taken, self._brains)
+            fair = left if self._threads == 1 else max(1, left // (PIECES_AHEAD * self._threads))
+            last = min(self._brains, first + fair)
+            self._taken += last - first
+            return episode, first, last
 
 
 def _usable_cores() -> int:

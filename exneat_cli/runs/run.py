@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from exneat_cli.brains import Brain, assemble, motionless
+from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.evolution import Team
 from exneat_cli.records import (
     DONE,
@@ -27,9 +27,9 @@ from exneat_cli.records import (
     write_hall_of_fame,
     write_history,
 )
-from exneat_cli.rollouts import Job, Runner, Trace
+from exneat_cli.rollouts import Runner, Trace
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import Score, baseline_jobs, score, score_brains, summary_sentence
+from exneat_cli.runs.scores import Score, baseline, baseline_episodes, score_all, score_brains, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
@@ -153,7 +153,7 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
         best = max(range(len(entries)), key=lambda k: validation[k].fitness_mean)
         first = _compile(settings, trained.first_generation)
         tested = score_brains(runner, [brains[best], _standing_still(settings), first], "test", settings.test_episodes)
-        trace = runner.trace(Job(brains[best], shared_episodes("test", 1)[0]))
+        trace = runner.trace(brains[best], shared_episodes("test", 1)[0])
     scores = {
         "training": {"fitness": entries[best].fitness, "generation": entries[best].generation + 1},
         "validation": asdict(validation[best]),
@@ -167,11 +167,12 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
 
 
 def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
-    jobs = baseline_jobs(settings.task, settings.algorithm, settings.seed, settings.test_episodes)
+    acting = baseline(settings.task, settings.algorithm)
+    episodes = baseline_episodes(settings.seed, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        tested = score(runner.run(jobs))
+        (tested,) = score_all(runner.run(acting if isinstance(acting, RandomActions) else [acting], episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
-        trace = runner.trace(jobs[0])
+        trace = runner.trace(acting, episodes[0])
     _write_trace(settings, directory, trace)
     write_csv(directory.robustness, ROBUSTNESS_COLUMNS, [_unperturbed(settings, tested)])
     return {"champion": asdict(tested), "standing_still": asdict(standing)}

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, RandomActions, linear_fusion
-from exneat_cli.rollouts import Job, Outcome, Runner
-from exneat_cli.seeding import shared_episodes, stream
+from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import Task
 
 
@@ -35,36 +36,41 @@ class Score:
     fitness: tuple[float, ...]
 
 
-def score(outcomes: Sequence[Outcome]) -> Score:
-    """Summary of one brain's episodes."""
-    fitness = np.array([outcome.fitness for outcome in outcomes])
-    full_reward = np.array([outcome.full_reward for outcome in outcomes])
+def score_all(outcomes: Outcomes) -> list[Score]:
+    """Summary of each brain's episodes."""
+    return [_score(*(values[k] for values in outcomes)) for k in range(len(outcomes.fitness))]
+
+
+def _score(
+    fitness: NDArray[np.float64], full_reward: NDArray[np.float64], steps: NDArray[np.int64], failed: NDArray[np.bool_]
+) -> Score:
     return Score(
-        episodes=len(outcomes),
+        episodes=len(fitness),
         fitness_mean=float(fitness.mean()),
         fitness_std=float(fitness.std()),
         full_reward_mean=float(full_reward.mean()),
         full_reward_std=float(full_reward.std()),
-        failed_episodes=sum(outcome.failed for outcome in outcomes),
+        failed_episodes=int(failed.sum()),
         fitness=tuple(fitness.tolist()),
     )
 
 
 def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes: int) -> list[Score]:
     """Scores of several brains on the same ``"validation"`` or ``"test"`` episodes, side by side."""
-    return [score(outcomes) for outcomes in runner.run_each(brains, shared_episodes(purpose, episodes))]
+    return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
 
 
-def baseline_jobs(task: Task, algorithm: str, root: int, episodes: int) -> list[Job]:
-    """The test episodes for ``random`` (which draws from the run's own stream) or ``linear_fusion``."""
-    tests = shared_episodes("test", episodes)
+def baseline(task: Task, algorithm: str) -> Brain | RandomActions:
+    """What acts for ``random`` or ``linear_fusion``."""
     if algorithm == "linear_fusion":
-        brain = linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
-        return [Job(brain, seeds) for seeds in tests]
-    return [
-        Job(RandomActions(*task.action_bounds), seeds._replace(actions=stream(root, "random_actions", episode)))
-        for episode, seeds in enumerate(tests)
-    ]
+        return linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
+    return RandomActions(*task.action_bounds)
+
+
+def baseline_episodes(root: int, episodes: int) -> list[EpisodeSeeds]:
+    """The test episodes, with actions at random from the run's own stream."""
+    tests = shared_episodes("test", episodes)
+    return [each._replace(actions=stream(root, "random_actions", k)) for k, each in enumerate(tests)]
 
 
 def summary_sentence(task: Task, result: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from exneat_cli.brains import assemble
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, neat_config
 from exneat_cli.records import HistoryRow
-from exneat_cli.rollouts import Outcome, Runner
+from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import stream, training_episodes
 
@@ -87,31 +87,26 @@ class _Training:
         generation = len(self.history)
         teams = self._coevolution.ask()
         outcomes = self._evaluate(teams, generation)
-        fitness = [self._team_fitness(episodes) for episodes in outcomes]
-        sound = [k for k, episodes in enumerate(outcomes) if not any(outcome.failed for outcome in episodes)]
+        failed = outcomes.failed.any(axis=1)
+        means = outcomes.fitness.mean(axis=1)
+        fitness = np.where(failed, self._settings.task.failure_floor, means).tolist()
+        sound = np.flatnonzero(~failed).tolist()
         self._coevolution.tell(_failed_last(fitness, sound))
         for k in sound:
             self.hall_of_fame.add(teams[k], fitness[k], generation)
         best = max(sound or range(len(teams)), key=lambda k: fitness[k])
         if self.first_generation is None:
             self.first_generation = teams[best]
-        self._record(teams[best], fitness, fitness[best], [outcome for team in outcomes for outcome in team])
+        self._record(teams[best], fitness, fitness[best], outcomes)
 
-    def _evaluate(self, teams: Sequence[Team], generation: int) -> list[list[Outcome]]:
+    def _evaluate(self, teams: Sequence[Team], generation: int) -> Outcomes:
         settings = self._settings
         seeds = training_episodes(settings.seed, generation, settings.episodes)
         feed_forward = settings.evolution.feed_forward
         brains = [assemble(self._plan, team.genomes, feed_forward=feed_forward) for team in teams]
-        return self._runner.run_each(brains, seeds)
+        return self._runner.run(brains, seeds)
 
-    def _team_fitness(self, episodes: Sequence[Outcome]) -> float:
-        if any(outcome.failed for outcome in episodes):
-            return self._settings.task.failure_floor
-        return float(np.mean([outcome.fitness for outcome in episodes]))
-
-    def _record(
-        self, best_team: Team, fitness: Sequence[float], best_fitness: float, episodes: Sequence[Outcome]
-    ) -> None:
+    def _record(self, best_team: Team, fitness: Sequence[float], best_fitness: float, outcomes: Outcomes) -> None:
         before = self.history[-1] if self.history else None
         genomes = list(zip(best_team.genomes, self._plan.subpopulation_shapes, strict=True))
         self.history.append(
@@ -121,12 +116,12 @@ class _Training:
                 mean_fitness=float(np.mean(fitness)),
                 median_fitness=float(np.median(fitness)),
                 best_so_far=max(best_fitness, before.best_so_far) if before else best_fitness,
-                episodes=len(episodes) + (before.episodes if before else 0),
-                env_steps=sum(outcome.steps for outcome in episodes) + (before.env_steps if before else 0),
+                episodes=outcomes.steps.size + (before.episodes if before else 0),
+                env_steps=int(outcomes.steps.sum()) + (before.env_steps if before else 0),
                 species=self._coevolution.species_count,
                 connections=sum(gene.enabled for g, _ in genomes for gene in g.connections.values()),
                 hidden_nodes=sum(len(genome.nodes) - outputs for genome, (_, _, outputs) in genomes),
-                failed_episodes=sum(outcome.failed for outcome in episodes),
+                failed_episodes=int(outcomes.failed.sum()),
                 extinctions=self._coevolution.extinctions,
                 wall_seconds=round(time.perf_counter() - self._began, 3),
             )

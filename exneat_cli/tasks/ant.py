@@ -136,6 +136,11 @@ class AntTask:
         return tuple(model.joint(joint).name for joint in model.actuator_trnid[:, 0])
 
     @property
+    def longest_episode(self) -> int:
+        """`max_steps`."""
+        return self.max_steps
+
+    @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest control of each actuator, -1 and 1."""
         low, high = _model().actuator_ctrlrange.T
@@ -144,13 +149,13 @@ class AntTask:
     def tiles(self, world: object) -> None:
         """Ant walks on an endless plane."""
 
-    def fitness_of(self, totals: NDArray[np.float64]) -> float:
+    def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forward reward of an episode, in m/s summed over control steps."""
-        return float(totals[0])
+        return np.asarray(totals[..., 0])
 
-    def full_reward_of(self, totals: NDArray[np.float64]) -> float:
+    def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forward and healthy reward less the costs of effort and contact."""
-        return float(np.sum(totals))
+        return np.asarray(np.sum(totals, axis=-1))
 
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new world, compiled where MuJoCo can be reached from compiled code, else over Gymnasium.
@@ -188,6 +193,8 @@ class AntTask:
             warnings=data.warning.number,
             initial_qpos=data.qpos.copy(),
             initial_qvel=data.qvel.copy(),
+            start_qpos=data.qpos.copy(),
+            start_qvel=data.qvel.copy(),
             trunk=TRUNK_BODY,
             substeps=SUBSTEPS,
             control_period=float(model.opt.timestep) * SUBSTEPS,

@@ -1,4 +1,4 @@
-"""The compiled episode of Ant: reset, observe, step and locate over MuJoCo's own memory.
+"""The compiled episode of Ant: reset, restart, observe, step and locate over MuJoCo's own memory.
 
 Written over index lists and sizes taken from the model, so any legged model fits. Follows Gymnasium's
 Ant-v5 (Farama Foundation, 2024) operation by operation, so that results agree to the last bits.
@@ -28,6 +28,7 @@ class AntWorld(NamedTuple):
         qpos, qvel, ctrl, xpos, cfrc_ext: views of `mjData`; shapes (nq,), (nv,), (nu,), (nbody, 3), (nbody, 6).
         warnings: view of MuJoCo's warning counters.
         initial_qpos, initial_qvel: the pose that a reset perturbs.
+        start_qpos, start_qvel: what it made of it.
         trunk: body whose height and x position count.
         substeps, control_period: physics steps per control step, and its length in seconds.
         reset_scale: half-width of the uniform noise on positions (rad, m), sd of that on velocities.
@@ -50,6 +51,8 @@ class AntWorld(NamedTuple):
     warnings: NDArray[np.int32]
     initial_qpos: NDArray[np.float64]
     initial_qvel: NDArray[np.float64]
+    start_qpos: NDArray[np.float64]
+    start_qvel: NDArray[np.float64]
     trunk: int
     substeps: int
     control_period: float
@@ -70,14 +73,22 @@ class AntWorld(NamedTuple):
 @compiled
 def reset(world: AntWorld, rng: Generator) -> None:
     """Put the body near its initial pose, as Gymnasium's Ant does with the same generator."""
+    for i in range(world.qpos.size):
+        world.start_qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
+    for i in range(world.qvel.size):
+        world.start_qvel[i] = world.initial_qvel[i] + world.reset_scale * rng.standard_normal()
+    restart(world)
+
+
+@compiled
+def restart(world: AntWorld) -> None:
+    """Put the body back to where the last reset had put it."""
     mj_resetData(world.model, world.data)
     world.clock[STEPS] = 0
     world.clock[STUCK_STEPS] = 0
     world.clock[WARNINGS] = np.sum(world.warnings)
-    for i in range(world.qpos.size):
-        world.qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
-    for i in range(world.qvel.size):
-        world.qvel[i] = world.initial_qvel[i] + world.reset_scale * rng.standard_normal()
+    world.qpos[:] = world.start_qpos
+    world.qvel[:] = world.start_qvel
     mj_forward(world.model, world.data)
     world.mark[0] = world.xpos[world.trunk, 0]
 
@@ -99,7 +110,7 @@ def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
 
 
 @compiled
-def step(world: AntWorld, action: NDArray[np.float64], rng: Generator, terms: NDArray[np.float64]) -> int:
+def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
     """One control step; `terms` become forward, healthy, control and contact reward of this step."""
     for i in range(action.size):
         if not np.isfinite(action[i]):

@@ -6,6 +6,7 @@ not help since Python holds the GIL.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -33,6 +34,7 @@ class GymnasiumAnt:
         self.progress = progress
         self.patience = patience
         self.observation = np.zeros(0)
+        self.state_at_reset: Mapping[str, Any] = {}
         self.mark = 0.0
         self.stuck_steps = 0
         self.warnings_at_reset = 0
@@ -51,6 +53,13 @@ class GymnasiumAnt:
 def reset(world: GymnasiumAnt, rng: Generator) -> None:
     """Put the body near its initial pose, drawing from `rng`."""
     world.env.unwrapped.np_random = rng
+    world.state_at_reset = rng.bit_generator.state
+    restart(world)
+
+
+def restart(world: GymnasiumAnt) -> None:
+    """Put the body back to where the last reset had put it, by drawing the same again."""
+    world.env.unwrapped.np_random.bit_generator.state = world.state_at_reset
     world.observation, _ = world.env.reset()
     world.warnings_at_reset = 0
     world.mark = float(world.position[0])
@@ -62,7 +71,7 @@ def observe(world: GymnasiumAnt, observation: NDArray[np.float64]) -> None:
     observation[:] = world.observation
 
 
-def step(world: GymnasiumAnt, action: NDArray[np.float64], rng: Generator, terms: NDArray[np.float64]) -> int:
+def step(world: GymnasiumAnt, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
     """One control step; `terms` become forward, healthy, control and contact reward of this step."""
     if not np.isfinite(action).all():
         return FAILED

@@ -25,7 +25,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.tasks.compiling import compiled, compiled_lean
 from exneat_cli.tasks.task import Sector
 
 CHANNELS = 2
@@ -98,16 +98,16 @@ class GridTask:
         tiles: NDArray[np.float64] = np.stack([world.grid.path, *world.grid.signals], axis=2)
         return tiles
 
-    def fitness_of(self, totals: NDArray[np.float64]) -> float:
+    def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rewards add up to the fitness of the episode."""
-        return float(np.sum(totals))
+        return np.asarray(np.sum(totals, axis=-1))
 
-    def full_reward_of(self, totals: NDArray[np.float64]) -> float:
+    def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same: grid worlds have one figure."""
-        return float(np.sum(totals))
+        return self.fitness_of(totals)
 
 
-@compiled
+@compiled_lean
 def sense(signals: NDArray[np.float64], agent: NDArray[np.int64], observation: NDArray[np.float64]) -> None:
     """Write both channels of the four neighbours, unclipped."""
     for side in range(4):
@@ -117,7 +117,7 @@ def sense(signals: NDArray[np.float64], agent: NDArray[np.int64], observation: N
         observation[CHANNELS * side + 1] = signals[1, row, column]
 
 
-@compiled
+@compiled_lean
 def move(path: NDArray[np.int64], agent: NDArray[np.int64], action: NDArray[np.float64]) -> bool:
     """Take the step with the largest value, or stay in front of a wall; counts the step.
 

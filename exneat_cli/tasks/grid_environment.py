@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.grid import COLUMN, MOVES, ROW, Grid
+from exneat_cli.tasks.grid import COLUMN, MOVES, ROW
 from exneat_cli.tasks.maze_dynamics import GOAL_COLUMN, GOAL_ROW
 from exneat_cli.tasks.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.predator_prey import Foraging, Hunting
@@ -71,9 +71,9 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
             raise ValueError(f"action: expected a whole number from 0 to {len(MOVES) - 1}, got {action!r}")
         terms = np.zeros(len(self.task.terms))
         values = np.eye(len(MOVES))[action]
-        status = self._simulation.step(self._simulation.world, values, self.np_random, terms)
+        status = self._simulation.step(self._simulation.world, values, terms)
         info = dict(zip(self.task.terms, terms.tolist(), strict=True))
-        return self._observe(), self.task.fitness_of(terms), status != RUNNING, False, info
+        return self._observe(), float(self.task.fitness_of(terms)), status != RUNNING, False, info
 
     def render(self) -> Any:
         """The world as an (N * 16, N * 16, 3) picture or as text.
@@ -81,16 +81,20 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         Red is channel 1, blue channel 2, black wall, green the agent (A), yellow the goal or free prey (o).
         """
         if self.render_mode == "ansi":
-            return _as_text(self._grid, self._targets)
+            return _as_text(self._tiles, self._agent, self._targets)
         if self.render_mode == "rgb_array":
-            return _as_picture(self._grid, self._targets)
+            return _as_picture(self._tiles, self._agent, self._targets)
         gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
         return None
 
     @property
-    def _grid(self) -> Grid:
-        grid: Grid = self._simulation.world.grid
-        return grid
+    def _tiles(self) -> NDArray[np.float64]:
+        return self.task.tiles(self._simulation.world)
+
+    @property
+    def _agent(self) -> tuple[int, int]:
+        agent = self._simulation.world.grid.agent
+        return int(agent[ROW]), int(agent[COLUMN])
 
     @property
     def _targets(self) -> list[tuple[int, int]]:
@@ -104,23 +108,22 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         return np.clip(self._observation, *self.task.observation_limits)
 
 
-def _as_text(grid: Grid, targets: list[tuple[int, int]]) -> str:
-    tiles = np.where(grid.path == 1, ".", "#").astype(object)
+def _as_text(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]) -> str:
+    signs = np.where(tiles[..., 0] == 1, ".", "#").astype(object)
     for row, column in targets:
-        tiles[row, column] = "o"
-    tiles[grid.agent[ROW], grid.agent[COLUMN]] = "A"
-    return "\n".join("".join(row) for row in tiles) + "\n"
+        signs[row, column] = "o"
+    signs[agent] = "A"
+    return "\n".join("".join(row) for row in signs) + "\n"
 
 
-def _as_picture(grid: Grid, targets: list[tuple[int, int]]) -> NDArray[np.uint8]:
-    cues = np.clip(grid.signals, 0.0, 1.0)
-    colours = np.zeros((*grid.path.shape, 3))
-    colours[..., 0] = 1.0 - cues[1]
-    colours[..., 1] = 1.0 - np.maximum(cues[0], cues[1])
-    colours[..., 2] = 1.0 - cues[0]
-    colours[grid.path == 0] = 0.0
+def _as_picture(
+    tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]
+) -> NDArray[np.uint8]:
+    cues = np.clip(tiles[..., 1:], 0.0, 1.0)
+    colours = np.stack([1.0 - cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - cues[..., 0]], axis=2)
+    colours[tiles[..., 0] == 0] = 0.0
     for row, column in targets:
         colours[row, column] = (1.0, 0.85, 0.0)
-    colours[grid.agent[ROW], grid.agent[COLUMN]] = (0.0, 0.6, 0.2)
+    colours[agent] = (0.0, 0.6, 0.2)
     picture = np.kron(colours, np.ones((PIXELS_PER_TILE, PIXELS_PER_TILE, 1)))
     return (255 * picture).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The compiled episode of both mazes: reset, observe, step and locate.
+"""The compiled episode of both mazes: reset, restart, observe, step and locate.
 
 A maze is solved when the agent stands on the goal. The episode ends there, or `t_fast + SPARE_STEPS` steps
 after its start, `t_fast` being the walking distance from start to goal. Its fitness, paid at the last
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.tasks.compiling import compiled, compiled_lean
 from exneat_cli.tasks.grid import (
     COLUMN,
     COLUMN_STEPS,
@@ -36,8 +36,8 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 
 SPARE_STEPS = 2
 """Steps allowed beyond the fastest way (Zhang, 2025, section 3.2.1)."""
-GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST = range(4)
-"""Entries of `Maze.goal`: where it is, walking distance from the start, largest distance in the maze."""
+GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST, START_ROW, START_COLUMN = range(6)
+"""Entries of `Maze.goal`: where it is, walking distance from the start, largest distance in the maze, the start."""
 LEAST_CUE, MOST_CUE = 0.1, 0.5
 """Ends of a track's ramp, from the tile beside the centre to the goal."""
 
@@ -81,7 +81,7 @@ def new_maze(
         grid=empty_grid(size),
         distances=np.zeros((size, size), np.int64),
         queue=np.zeros((size * size, 2), np.int64),
-        goal=np.zeros(4, np.int64),
+        goal=np.zeros(6, np.int64),
         gap=gap,
         cue_noise=float(cue_noise),
         cues_removed=float(cues_removed),
@@ -169,11 +169,12 @@ def _corner(index, size):  # type: ignore[no-untyped-def]
 
 @compiled
 def _begin(maze, start_row, start_column, goal_row, goal_column):  # type: ignore[no-untyped-def]
-    agent, goal = maze.grid.agent, maze.goal
-    agent[ROW], agent[COLUMN], agent[STEPS] = start_row, start_column, 0
+    goal = maze.goal
+    goal[START_ROW], goal[START_COLUMN] = start_row, start_column
     goal[GOAL_ROW], goal[GOAL_COLUMN] = goal_row, goal_column
     goal[FURTHEST] = measure_distances(maze.grid.path, goal_row, goal_column, maze.distances, maze.queue)
     goal[FASTEST] = maze.distances[start_row, start_column]
+    restart(maze)
 
 
 @compiled
@@ -228,14 +229,21 @@ def _add_cue_noise(maze, rng):  # type: ignore[no-untyped-def]
                     grid.signals[channel, row, column] = max(noisy, 0.0)
 
 
-@compiled
+@compiled_lean
+def restart(maze: Maze) -> None:
+    """Put the agent back to its start."""
+    agent, goal = maze.grid.agent, maze.goal
+    agent[ROW], agent[COLUMN], agent[STEPS] = goal[START_ROW], goal[START_COLUMN], 0
+
+
+@compiled_lean
 def observe(maze: Maze, observation: NDArray[np.float64]) -> None:
     """Write the cues of the four neighbours."""
     sense(maze.grid.signals, maze.grid.agent, observation)
 
 
-@compiled
-def step(maze: Maze, action: NDArray[np.float64], rng: Generator, terms: NDArray[np.float64]) -> int:
+@compiled_lean
+def step(maze: Maze, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
     """One move; `terms` become the rewards of time and progress, 0 before the last step."""
     terms[:] = 0.0
     if not move(maze.grid.path, maze.grid.agent, action):

@@ -17,7 +17,7 @@ from typing import ClassVar
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
 from exneat_cli.tasks import maze_dynamics
 from exneat_cli.tasks.grid import GridTask
-from exneat_cli.tasks.maze_dynamics import new_maze
+from exneat_cli.tasks.maze_dynamics import SPARE_STEPS, new_maze
 from exneat_cli.tasks.task import Simulation
 
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
@@ -31,12 +31,18 @@ def _check_odd_size(size: object, smallest: int) -> None:
 
 
 class _MazeTask(GridTask):
+    size: int
     terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
 
     @property
     def trace_columns(self) -> tuple[str, ...]:
         """Row and column of the agent, then of the goal."""
         return ("row", "column", "goal_row", "goal_column")
+
+    @property
+    def longest_episode(self) -> int:
+        """No way leads over more than all tiles."""
+        return self.size**2 + SPARE_STEPS
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
 from exneat_cli.tasks import prey_dynamics
-from exneat_cli.tasks.grid import GridTask
+from exneat_cli.tasks.grid import CHANNELS, GridTask
 from exneat_cli.tasks.prey_dynamics import Field, new_field
 from exneat_cli.tasks.task import Simulation
 
 MOTIONS = ("levy", "brownian")
+MOST_CUES = 2**25
+"""Numbers that one world may hold, 256 MiB."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,7 @@ class Foraging(GridTask):
         name: always ``foraging``.
         size: open tiles per side, 3 to 99.
         n_prey: at most size * size - 1.
-        steps: moves of the agent, at least 1.
+        steps: moves of the agent, at least 1; what every prey emits is kept for all of them, 256 MiB at most.
         p_e: chance per prey, step and channel that the cue has a direction, 0 to 1.
         p_c: decay of the cues per step, 0 (they stay) to 1 (they vanish at once).
         patch_width: tiles per side of an emission, odd, 1 to 15.
@@ -62,12 +67,28 @@ class Foraging(GridTask):
         check_whole("task.patch_width", self.patch_width, 1, 15)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
+        per_step = (self.size + 2) ** 2 * self.n_prey * (CHANNELS if self.emits_both else 1)
+        if self.steps * per_step > MOST_CUES:
+            most = MOST_CUES // per_step
+            mend = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
+            raise ConfigError("task.steps", f"at most {most} for this size and n_prey", self.steps, mend)
 
     @property
     def trace_columns(self) -> tuple[str, ...]:
         """The agent's row and column, then row, column and freedom (1 free, 0 caught) of each prey."""
         prey = [f"prey_{k}_{what}" for k in range(self.n_prey) for what in ("row", "column", "free")]
         return ("row", "column", *prey)
+
+    @property
+    def longest_episode(self) -> int:
+        """`steps`."""
+        return self.steps
+
+    def tiles(self, world: Field) -> NDArray[np.float64]:
+        """(N, N, 3) path (1 or 0) and both channels of the cue field as the agent sensed it last."""
+        signals = np.zeros_like(world.grid.signals)
+        prey_dynamics.paint(world, signals)
+        return np.stack([world.grid.path, *signals], axis=2)
 
     def open(self, *, training: bool, reset_scale: float) -> Simulation:
         """A new field; neither argument matters here."""

@@ -1,9 +1,13 @@
-"""The compiled episode of foraging and hunting: reset, observe, step and locate.
+"""The compiled episode of foraging and hunting: reset, restart, observe, step and locate.
 
 Each step begins with the world: the cue field decays; each free prey on the agent's tile is caught; each
 other one may move, is caught if it enters the agent's tile, and adds a patch of cue around itself, or the
 same patch with its values shuffled, which carries no direction. Then the agent senses and moves; stepping
 onto a prey catches it. Fitness is the share of prey caught, paid at the last step.
+
+Prey do not heed the agent. So a reset draws all paths and cues up to the last step, each emitter's apart
+(an emitter is a prey on one channel), and a step only looks up four tiles; a caught prey's cues are taken
+from the moment before, and fade.
 
 Source: Zhang (2025), section 3.2.2.
 """
@@ -16,8 +20,18 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.compiling import compiled
-from exneat_cli.tasks.grid import COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, Grid, empty_grid, move, sense
+from exneat_cli.tasks.compiling import compiled, compiled_lean
+from exneat_cli.tasks.grid import (
+    CHANNELS,
+    COLUMN,
+    COLUMN_STEPS,
+    ROW,
+    ROW_STEPS,
+    STEPS,
+    Grid,
+    empty_grid,
+    move,
+)
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 
 LONGEST_FLIGHT = 7
@@ -27,42 +41,58 @@ PATCH_SD = 1.0
 """Tiles."""
 DRAWS_PER_NUMBER = 4
 """Choices of a shuffle that share one uniform number; each of up to 225 uses at most 8 of its 53 bits."""
-PREY_ROW, PREY_COLUMN, FREE, DIRECTION, FLIGHT = range(5)
-"""Columns of `Field.prey`: where it is, whether it is free, its direction and the steps left of its flight."""
+PREY_ROW, PREY_COLUMN, FREE = range(3)
+"""Columns of `Field.prey`: where it is, or was when it was caught, and whether it is free."""
+WALK_ROW, WALK_COLUMN, DIRECTION, FLIGHT = range(4)
+"""Columns of `Field.walkers`: where a prey is, its direction and the steps left of its flight."""
 
 
 class Field(NamedTuple):
     """An open field with prey.
 
+    T is the number of times that the agent senses, E that of emitters: prey on channel 1, then on channel 2.
+
     Attributes:
-        grid: tiles and agent; signals are the cue field.
-        prey: (n_prey, 5), see `PREY_ROW`.
+        grid: tiles and agent; its signals are not used here.
+        prey: (n_prey, 3) as the agent left them, see `PREY_ROW`.
+        start: (n_prey, 2) where they are before the first step.
+        places: (T, n_prey, 2) where each one is when the agent senses, unless it was caught.
+        cues: (T, N, N, E) what each emitter adds to each tile when the agent senses.
+        emitters: (E,) the prey behind each emitter.
+        first_of_second: how many emitters are on channel 1.
+        last_free: (n_prey,) when its emitters were last heard; now, for a free one.
+        strength: (n_prey,) what is left of its cues since then.
+        walkers: (n_prey, 4) scratch, see `WALK_ROW`.
         width: tiles per side of an emission.
         patch: (width * width,) cue that an emission adds, 1 at its centre.
         shuffled: (width * width,) the same values in another order each time.
         flight_chance: (LONGEST_FLIGHT,) cumulative probability of flight lengths.
         scratch: (tiles, 2).
         emission: chance per prey, step and channel that the patch has a direction.
-        decay: share of the field that fades at each step.
+        keep: share of the field that is left after a step.
         motion: chance that a prey moves in a step; 0 where prey never move.
         levy: straight flights, else a new direction for each move.
-        both_channels: every prey emits on both channels, else they alternate by index.
-        max_steps: moves of the agent.
     """
 
     grid: Grid
     prey: NDArray[np.int64]
+    start: NDArray[np.int64]
+    places: NDArray[np.int64]
+    cues: NDArray[np.float64]
+    emitters: NDArray[np.int64]
+    first_of_second: int
+    last_free: NDArray[np.int64]
+    strength: NDArray[np.float64]
+    walkers: NDArray[np.int64]
     width: int
     patch: NDArray[np.float64]
     shuffled: NDArray[np.float64]
     flight_chance: NDArray[np.float64]
     scratch: NDArray[np.int64]
     emission: float
-    decay: float
+    keep: float
     motion: float
     levy: bool
-    both_channels: bool
-    max_steps: int
 
 
 def new_field(
@@ -77,95 +107,107 @@ def new_field(
     both_channels: bool,
     max_steps: int,
 ) -> Field:
-    """Storage for an open square of size x size tiles with a wall around."""
+    """Storage for an open square of size x size tiles with a wall around.
+
+    Args:
+        size: open tiles per side.
+        n_prey: number of prey.
+        patch_width: tiles per side of an emission.
+        emission: chance per prey, step and channel that the patch has a direction.
+        decay: share of the field that fades at each step.
+        motion: chance that a prey moves in a step.
+        levy: straight flights, else a new direction for each move.
+        both_channels: every prey emits on both channels, else they alternate by index.
+        max_steps: moves of the agent.
+    """
     offsets = np.arange(patch_width) - patch_width // 2
     profile = np.exp(-0.5 * (offsets / PATCH_SD) ** 2)
     lengths = np.arange(1, LONGEST_FLIGHT + 1) ** FLIGHT_EXPONENT
+    prey = np.arange(n_prey)
+    channels = [prey, prey] if both_channels else [prey[::2], prey[1::2]]
+    emitters = np.concatenate(channels)
     return Field(
         grid=empty_grid(size + 2),
-        prey=np.zeros((n_prey, 5), np.int64),
+        prey=np.zeros((n_prey, 3), np.int64),
+        start=np.zeros((n_prey, 2), np.int64),
+        places=np.zeros((max_steps, n_prey, 2), np.int64),
+        cues=np.zeros((max_steps, size + 2, size + 2, len(emitters))),
+        emitters=emitters,
+        first_of_second=len(channels[0]),
+        last_free=np.zeros(n_prey, np.int64),
+        strength=np.zeros(n_prey),
+        walkers=np.zeros((n_prey, 4), np.int64),
         width=patch_width,
         patch=np.outer(profile, profile).ravel(),
         shuffled=np.outer(profile, profile).ravel(),
         flight_chance=np.cumsum(lengths) / np.sum(lengths),
         scratch=np.zeros((size * size, 2), np.int64),
         emission=float(emission),
-        decay=float(decay),
+        keep=1.0 - decay,
         motion=float(motion),
         levy=levy,
-        both_channels=both_channels,
-        max_steps=max_steps,
     )
 
 
 @compiled
 def reset(field: Field, rng: Generator) -> None:
-    """Put the agent into the centre and prey on distinct other tiles, and let the first cues out."""
-    grid = field.grid
-    size = grid.path.shape[0]
+    """Put prey on distinct tiles but the centre, draw where they go and what they emit, and start."""
+    path = field.grid.path
+    path[:] = 0
+    path[1:-1, 1:-1] = 1
+    _place_prey(field.start, field.scratch, path.shape[0], rng)
+    field.walkers[:] = 0
+    field.walkers[:, :2] = field.start
     field.shuffled[:] = field.patch
-    grid.signals[:] = 0.0
-    grid.path[:] = 0
-    grid.path[1 : size - 1, 1 : size - 1] = 1
-    centre = size // 2
-    grid.agent[ROW], grid.agent[COLUMN], grid.agent[STEPS] = centre, centre, 0
-    count = 0
+    for t in range(field.cues.shape[0]):
+        _advance_prey(field, t, rng)
+    restart(field)
+
+
+@compiled
+def _place_prey(start, scratch, size, rng):  # type: ignore[no-untyped-def]
+    centre, count = size // 2, 0
     for row in range(1, size - 1):
         for column in range(1, size - 1):
             if row != centre or column != centre:
-                field.scratch[count, 0], field.scratch[count, 1] = row, column
+                scratch[count, 0], scratch[count, 1] = row, column
                 count += 1
-    for k in range(field.prey.shape[0]):
+    for k in range(start.shape[0]):
         chosen = k + int(rng.integers(0, count - k))
         for axis in range(2):
-            tile = field.scratch[chosen, axis]
-            field.scratch[chosen, axis] = field.scratch[k, axis]
-            field.prey[k, axis] = tile
-        field.prey[k, FREE] = 1
-        field.prey[k, DIRECTION] = 0
-        field.prey[k, FLIGHT] = 0
-    _advance_world(field, rng)
+            start[k, axis] = scratch[chosen, axis]
+            scratch[chosen, axis] = scratch[k, axis]
 
 
 @compiled
-def _advance_world(field, rng):  # type: ignore[no-untyped-def]
+def _advance_prey(field, t, rng):  # type: ignore[no-untyped-def]
     # Arrays are taken out of the tuple once: passing the tuple on costs more than what the callees do.
-    signals, prey, agent = field.grid.signals, field.prey, field.grid.agent
-    patch, shuffled, width, emission = field.patch, field.shuffled, field.width, field.emission
-    path, flight_chance, levy, motion = field.grid.path, field.flight_chance, field.levy, field.motion
-    both_channels = field.both_channels
-    keep = 1.0 - field.decay
-    everywhere = signals.reshape(signals.size)
-    for i in range(everywhere.size):
-        everywhere[i] *= keep
-    for k in range(prey.shape[0]):
-        _catch(prey, agent, k)
-        if prey[k, FREE] == 0:
-            continue
-        if motion > 0.0 and rng.random() < motion:
-            move_prey(prey, k, path, flight_chance, levy, rng)
-            _catch(prey, agent, k)
-            if prey[k, FREE] == 0:
+    walkers, path, cues = field.walkers, field.grid.path, field.cues
+    now = cues[t].reshape(cues[t].size)
+    if t == 0:
+        now[:] = 0.0
+    else:
+        before = cues[t - 1].reshape(now.size)
+        for i in range(now.size):
+            now[i] = field.keep * before[i]
+    for k in range(walkers.shape[0]):
+        if field.motion > 0.0 and rng.random() < field.motion:
+            move_prey(walkers, k, path, field.flight_chance, field.levy, rng)
+        row, column = walkers[k, WALK_ROW], walkers[k, WALK_COLUMN]
+        field.places[t, k, 0], field.places[t, k, 1] = row, column
+        for emitter in range(field.emitters.size):
+            if field.emitters[emitter] != k:
                 continue
-        for channel in range(2):
-            if not both_channels and channel != k % 2:
-                continue
-            if rng.random() < emission:
-                _add(signals, channel, prey[k, PREY_ROW], prey[k, PREY_COLUMN], patch, width)
+            if rng.random() < field.emission:
+                _add(cues[t], emitter, row, column, field.patch, field.width)
             else:
-                _shuffle(shuffled, rng)
-                _add(signals, channel, prey[k, PREY_ROW], prey[k, PREY_COLUMN], shuffled, width)
-
-
-@compiled
-def _catch(prey, agent, k):  # type: ignore[no-untyped-def]
-    if prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
-        prey[k, FREE] = 0
+                _shuffle(field.shuffled, rng)
+                _add(cues[t], emitter, row, column, field.shuffled, field.width)
 
 
 @compiled
 def move_prey(
-    prey: NDArray[np.int64],
+    walkers: NDArray[np.int64],
     k: int,
     path: NDArray[np.int64],
     flight_chance: NDArray[np.float64],
@@ -173,31 +215,31 @@ def move_prey(
     rng: Generator,
 ) -> None:
     """Move prey `k` by one tile: straight on in its flight, or in a new direction; walls end a flight."""
-    if prey[k, FLIGHT] == 0:
-        prey[k, DIRECTION] = int(4 * rng.random())
-        prey[k, FLIGHT] = 1
+    if walkers[k, FLIGHT] == 0:
+        walkers[k, DIRECTION] = int(4 * rng.random())
+        walkers[k, FLIGHT] = 1
         if levy:
             draw = rng.random()
-            while flight_chance[prey[k, FLIGHT] - 1] < draw:
-                prey[k, FLIGHT] += 1
-    side = prey[k, DIRECTION]
-    row, column = prey[k, PREY_ROW] + ROW_STEPS[side], prey[k, PREY_COLUMN] + COLUMN_STEPS[side]
+            while flight_chance[walkers[k, FLIGHT] - 1] < draw:
+                walkers[k, FLIGHT] += 1
+    side = walkers[k, DIRECTION]
+    row, column = walkers[k, WALK_ROW] + ROW_STEPS[side], walkers[k, WALK_COLUMN] + COLUMN_STEPS[side]
     if path[row, column] == 1:
-        prey[k, PREY_ROW], prey[k, PREY_COLUMN] = row, column
-        prey[k, FLIGHT] -= 1
+        walkers[k, WALK_ROW], walkers[k, WALK_COLUMN] = row, column
+        walkers[k, FLIGHT] -= 1
     else:
-        prey[k, FLIGHT] = 0
+        walkers[k, FLIGHT] = 0
 
 
 @compiled
-def _add(signals, channel, row, column, cues, width):  # type: ignore[no-untyped-def]
+def _add(tiles, emitter, row, column, cues, width):  # type: ignore[no-untyped-def]
     top, left = row - width // 2, column - width // 2
-    last = signals.shape[1] - 2
+    last = tiles.shape[0] - 2
     first_column, last_column = max(left, 1), min(left + width - 1, last)
     for r in range(max(top, 1), min(top + width - 1, last) + 1):
         offset = (r - top) * width - left
         for c in range(first_column, last_column + 1):
-            signals[channel, r, c] += cues[offset + c]
+            tiles[r, c, emitter] += cues[offset + c]
 
 
 @compiled
@@ -217,35 +259,84 @@ def _shuffle(values, rng):  # type: ignore[no-untyped-def]
         values[i], values[j] = values[j], values[i]
 
 
-@compiled
+@compiled_lean
+def restart(field: Field) -> None:
+    """Put the agent into the centre and set all prey free, where they were."""
+    agent, prey = field.grid.agent, field.prey
+    agent[ROW] = agent[COLUMN] = field.grid.path.shape[0] // 2
+    agent[STEPS] = 0
+    for k in range(prey.shape[0]):
+        prey[k, PREY_ROW], prey[k, PREY_COLUMN], prey[k, FREE] = field.start[k, 0], field.start[k, 1], 1
+        field.strength[k] = 1.0
+    _let_world_move(field)
+
+
+@compiled_lean
+def _let_world_move(field):  # type: ignore[no-untyped-def]
+    """Bring prey and cues to what the agent senses next; returns how many prey are free then."""
+    agent, prey, strength, last_free = field.grid.agent, field.prey, field.strength, field.last_free
+    t = agent[STEPS]
+    free = 0
+    for k in range(prey.shape[0]):
+        if prey[k, FREE] == 1:
+            row, column = field.places[t, k, 0], field.places[t, k, 1]
+            prey[k, PREY_ROW], prey[k, PREY_COLUMN] = row, column
+            if row != agent[ROW] or column != agent[COLUMN]:
+                last_free[k] = t
+                free += 1
+                continue
+            prey[k, FREE] = 0
+            if t == 0:
+                last_free[k] = 0
+                strength[k] = 0.0
+        strength[k] *= field.keep
+    return free
+
+
+@compiled_lean
 def observe(field: Field, observation: NDArray[np.float64]) -> None:
     """Write the cue field on the four neighbours."""
-    sense(field.grid.signals, field.grid.agent, observation)
+    agent, cues, emitters = field.grid.agent, field.cues, field.emitters
+    last_free, strength = field.last_free, field.strength
+    row, column = agent[ROW], agent[COLUMN]
+    observation[:] = 0.0
+    for emitter in range(emitters.size):
+        k = emitters[emitter]
+        t, share = last_free[k], strength[k]
+        channel = 0 if emitter < field.first_of_second else 1
+        for side in range(4):
+            cue = cues[t, row + ROW_STEPS[side], column + COLUMN_STEPS[side], emitter]
+            observation[CHANNELS * side + channel] += share * cue
 
 
 @compiled
-def step(field: Field, action: NDArray[np.float64], rng: Generator, terms: NDArray[np.float64]) -> int:
+def paint(field: Field, signals: NDArray[np.float64]) -> None:
+    """Write the whole cue field as it is now, `signals` being (2, N, N)."""
+    signals[:] = 0.0
+    for emitter in range(field.emitters.size):
+        k = field.emitters[emitter]
+        channel = 0 if emitter < field.first_of_second else 1
+        signals[channel] += field.strength[k] * field.cues[field.last_free[k], :, :, emitter]
+
+
+@compiled_lean
+def step(field: Field, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
     """One move of the agent and what the world does before the next; `terms` become the share caught."""
     prey, agent = field.prey, field.grid.agent
     terms[:] = 0.0
     if not move(field.grid.path, agent, action):
         return FAILED
-    for k in range(prey.shape[0]):
-        _catch(prey, agent, k)
-    if agent[STEPS] < field.max_steps and _count_free(prey) > 0:
-        _advance_world(field, rng)
-        if _count_free(prey) > 0:
-            return RUNNING
-    terms[0] = 1.0 - _count_free(prey) / prey.shape[0]
-    return ENDED
-
-
-@compiled
-def _count_free(prey):  # type: ignore[no-untyped-def]
     free = 0
     for k in range(prey.shape[0]):
+        if prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
+            prey[k, FREE] = 0
         free += prey[k, FREE]
-    return free
+    if agent[STEPS] < field.cues.shape[0] and free > 0:
+        free = _let_world_move(field)
+        if free > 0:
+            return RUNNING
+    terms[0] = 1.0 - free / prey.shape[0]
+    return ENDED
 
 
 @compiled

@@ -17,6 +17,10 @@ FAILED = 2
 """The simulation exploded or a value was not finite; nothing that it gave counts."""
 
 
+FUNCTIONS = ("reset", "restart", "observe", "step", "locate")
+"""What a module that simulates a task must define; see `Simulation`."""
+
+
 @dataclass(frozen=True)
 class Sector:
     """A place of the body with its own sensors, and maybe its own actuators.
@@ -37,15 +41,16 @@ class Sector:
 
 @dataclass(frozen=True)
 class Simulation:
-    """One world and the four functions that run episodes in it; use it from one thread at a time.
+    """One world and the five functions that run episodes in it; use it from one thread at a time.
 
     The functions are compiled ones that take `world` as a tuple of arrays, or plain Python ones.
 
     Attributes:
-        world: the storage, first argument of all four.
-        reset: ``reset(world, rng)`` draws a new world from a NumPy Generator.
+        world: the storage, first argument of all five.
+        reset: ``reset(world, rng)`` draws all the chance of a new world from a NumPy Generator, and starts it.
+        restart: ``restart(world)`` takes the same world back to its start.
         observe: ``observe(world, observation)`` writes the noiseless observation.
-        step: ``step(world, action, rng, terms)`` acts once, writes this step's reward terms and returns
+        step: ``step(world, action, terms)`` acts once, writes this step's reward terms and returns
             `RUNNING`, `ENDED` or `FAILED`.
         locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`.
         compiled: whether the functions are compiled.
@@ -54,6 +59,7 @@ class Simulation:
 
     world: Any
     reset: Callable[..., Any]
+    restart: Callable[..., Any]
     observe: Callable[..., Any]
     step: Callable[..., Any]
     locate: Callable[..., Any]
@@ -65,12 +71,12 @@ class Simulation:
         """A simulation whose functions are those of a module or namespace, unless `others` names one.
 
         Args:
-            functions: has `reset`, `observe`, `step` and `locate`.
+            functions: has `reset`, `restart`, `observe`, `step` and `locate`.
             world: the storage they work on.
             compiled: whether they are compiled.
             others: replace single fields, e.g. `reset` or `owner`.
         """
-        named = {name: getattr(functions, name, None) for name in ("reset", "observe", "step", "locate")}
+        named = {name: getattr(functions, name, None) for name in FUNCTIONS}
         return cls(world=world, compiled=compiled, **{**named, **others})
 
 
@@ -123,6 +129,10 @@ class Task(Protocol):
         """One name per entry of the action."""
 
     @property
+    def longest_episode(self) -> int:
+        """Control steps that no episode exceeds."""
+
+    @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest sensible action, one entry per actuator."""
 
@@ -132,8 +142,8 @@ class Task(Protocol):
     def tiles(self, world: Any) -> NDArray[np.float64] | None:
         """(N, N, 3) path (1 or 0) and both channels of every tile of a grid world; None elsewhere."""
 
-    def fitness_of(self, totals: NDArray[np.float64]) -> float:
-        """Fitness of an episode whose terms add up to `totals`."""
+    def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""
 
-    def full_reward_of(self, totals: NDArray[np.float64]) -> float:
-        """The second figure that tests report; equals the fitness where a task has only one."""
+    def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(...) the second figure that tests report; equals the fitness where a task has only one."""
