@@ -163,7 +163,8 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
     write_champion(directory.champion, _champion(settings, entries[best].team, scores))
     _write_trace(settings, directory, trace)
     names = ("champion", "standing_still", "first_generation")
-    return {name: asdict(each) for name, each in zip(names, tested, strict=True)}
+    training = {"training": trained.history[-1].best_so_far, "validation": validation[best].fitness_mean}
+    return {**training, **{name: asdict(each) for name, each in zip(names, tested, strict=True)}}
 
 
 def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:

@@ -1,0 +1,128 @@
+"""What a report is made from: the planned runs of experiments, and their CSV files as tables.
+
+A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, so
+runs with other settings never slip in, whatever else lies in the same folder.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import DONE, RunDirectory
+
+
+class MissingRuns(ExneatError):
+    """What is asked for needs runs that are not there; says which, and the command that makes them."""
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of an experiment, finished or not.
+
+    Attributes:
+        condition, arm, seed: its place in the experiment.
+        directory: where its files are, or will be.
+    """
+
+    condition: str
+    arm: str
+    seed: int
+    directory: RunDirectory
+
+
+@dataclass(frozen=True)
+class Study:
+    """One experiment at one budget.
+
+    Attributes:
+        experiment: its name.
+        budget: ``paper``, ``quick`` or ``smoke``.
+        claim: what it is to show, in one sentence.
+        command: the command line that makes what is missing.
+        fitness_name: what the task's fitness is, in words.
+        has_full_reward: whether the task has a second figure.
+        arms: name -> label, in the order of legends; the first is what others are compared with.
+        baselines: names of those arms that nothing trains.
+        conditions: name -> label.
+        sweeps: name of a robustness sweep -> label of its axis, with unit.
+        runs: all of them.
+    """
+
+    experiment: str
+    budget: str
+    claim: str
+    command: str
+    fitness_name: str
+    has_full_reward: bool
+    arms: Mapping[str, str]
+    baselines: tuple[str, ...]
+    conditions: Mapping[str, str]
+    sweeps: Mapping[str, str]
+    runs: tuple[PlannedRun, ...]
+
+    @property
+    def trained_arms(self) -> tuple[str, ...]:
+        """Names of the arms that learn."""
+        return tuple(name for name in self.arms if name not in self.baselines)
+
+    @functools.cached_property
+    def finished(self) -> tuple[PlannedRun, ...]:
+        """The runs that are done."""
+        return tuple(run for run in self.runs if _status(run.directory) == DONE)
+
+    def of(self, condition: str, arm: str) -> tuple[PlannedRun, ...]:
+        """Finished runs of one arm in one condition, in the order of their seeds."""
+        return tuple(run for run in self.finished if (run.condition, run.arm) == (condition, arm))
+
+    def require(self, condition: str, arms: Iterable[str]) -> None:
+        """Check that every one of `arms` has a finished run in `condition`.
+
+        Raises:
+            MissingRuns: one has none.
+        """
+        missing = [self.arms[arm] for arm in arms if not self.of(condition, arm)]
+        if missing:
+            what = f"{self.experiment}, {condition}, budget {self.budget}: no finished run of {', '.join(missing)}"
+            raise MissingRuns(f"{what}\n  {self.command}")
+
+    def history(self, condition: str, arm: str) -> pd.DataFrame:
+        """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
+        return _stacked([(run, pd.read_csv(run.directory.history)) for run in self.of(condition, arm)])
+
+    def robustness(self, condition: str, arm: str) -> pd.DataFrame:
+        """robustness.csv of all finished runs that have one, with a column ``seed``; may be empty."""
+        runs = [run for run in self.of(condition, arm) if run.directory.robustness.exists()]
+        return _stacked([(run, pd.read_csv(run.directory.robustness)) for run in runs])
+
+    def results(self, condition: str, arm: str) -> pd.DataFrame:
+        """One row per finished run: seed, training (final best so far), validation, test, full_reward."""
+        rows = [
+            {"seed": run.seed, **_result(run.directory.read_manifest()["result"])} for run in self.of(condition, arm)
+        ]
+        return pd.DataFrame(rows, columns=["seed", "training", "validation", "test", "full_reward"])
+
+
+def _status(directory: RunDirectory) -> object:
+    return directory.read_manifest().get("status") if directory.is_there() else None
+
+
+def _result(result: Mapping[str, Any]) -> dict[str, float]:
+    champion = result["champion"]
+    return {
+        "training": result.get("training", float("nan")),
+        "validation": result.get("validation", float("nan")),
+        "test": champion["fitness_mean"],
+        "full_reward": champion["full_reward_mean"],
+    }
+
+
+def _stacked(tables: list[tuple[PlannedRun, pd.DataFrame]]) -> pd.DataFrame:
+    if not tables:
+        return pd.DataFrame()
+    return pd.concat([table.assign(seed=run.seed) for run, table in tables], ignore_index=True)
