@@ -17,7 +17,7 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.records import DONE, RunDirectory
 
 
-class MissingRuns(ExneatError):
+class MissingRunsError(ExneatError):
     """What is asked for needs runs that are not there; says which, and the command that makes them."""
 
 
@@ -84,12 +84,12 @@ class Study:
         """Check that every one of `arms` has a finished run in `condition`.
 
         Raises:
-            MissingRuns: one has none.
+            MissingRunsError: one has none.
         """
         missing = [self.arms[arm] for arm in arms if not self.of(condition, arm)]
         if missing:
             what = f"{self.experiment}, {condition}, budget {self.budget}: no finished run of {', '.join(missing)}"
-            raise MissingRuns(f"{what}\n  {self.command}")
+            raise MissingRunsError(f"{what}\n  {self.command}")
 
     def history(self, condition: str, arm: str) -> pd.DataFrame:
         """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
