@@ -12,11 +12,20 @@ from exneat_cli.errors import ExneatError
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
+    "sweep": "train all arms of an experiment and test how they hold up",
+    "evaluate": "test finished runs under perturbations",
+    "report": "make tables, figures and a page of them from the runs there are",
     "inspect": "show a run's wiring, or list the runs",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
-USAGE = {"inspect": "usage: exneat inspect [run=<run directory>] [output=<root of runs, outputs by default>]"}
+USAGE = {
+    "sweep": "usage: exneat sweep experiment=<name or file.yaml> [budget=paper|quick|smoke] [key=value ...]\n"
+    "  every setting of exneat train is one of all runs here; hydra/launcher=joblib runs them side by side",
+    "report": "usage: exneat report [budget=paper|quick|smoke] [only=figure-4.3] [experiment=<name or file.yaml>]\n"
+    "  [axis=generation|episodes|env_steps] [output=<root of runs, outputs by default>]",
+    "inspect": "usage: exneat inspect [run=<run directory>] [output=<root of runs, outputs by default>]",
+}
 """What --help prints for the commands that Hydra does not answer for."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
@@ -29,6 +38,9 @@ usage: exneat <command> [key=value ...]
   exneat train task=ant algorithm=neat seed=3   the same task for NEAT
   exneat train -m seed=0,1,2 noise.sensor_std=0,0.1
   exneat train --help                           every setting with its default
+  exneat sweep experiment=track_maze            all arms, conditions and seeds, trained and tested
+  exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
+  exneat report                                 outputs/report/index.html
   exneat inspect                                the runs under outputs/
   exneat inspect run=outputs/ant/<run>          one run's modules, sensors and joints
 """

@@ -6,10 +6,13 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import hydra
+from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -31,6 +34,7 @@ _FLAGS_WITH_VALUE = {
     *("--package", "-p", "--cfg", "-c", "--shell-completion", "-sc"),
 }
 _LONGEST_LINE = 300
+_NOT_OF_THE_RUN = ("budget", "budgets", "sweep", "sweeps")
 
 
 def configuration_directory() -> Path:
@@ -40,13 +44,16 @@ def configuration_directory() -> Path:
     return packaged if packaged.is_dir() else package.parent / "conf"
 
 
-def run_composed(program: str, arguments: Sequence[str], job: Callable[[DictConfig], None]) -> None:
+def run_composed(
+    program: str, arguments: Sequence[str], job: Callable[[DictConfig], None], config_name: str = "config"
+) -> None:
     """Compose the configuration and call `job` with it, or with each of a multirun's.
 
     Args:
         program: what Hydra calls the program in its help, e.g. ``exneat train``.
         arguments: overrides and Hydra's flags, in any order.
         job: called once per combination; what it raises in a multirun stops only that combination.
+        config_name: file in conf/ that the composition starts from.
 
     Raises:
         ExneatError: the configuration cannot be composed.
@@ -66,7 +73,7 @@ def run_composed(program: str, arguments: Sequence[str], job: Callable[[DictConf
     try:
         with tempfile.TemporaryDirectory() as scratch:
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
-            hydra.main(version_base="1.3", config_path=directory, config_name="config")(guarded)()
+            hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
     except Exception as error:
         if error in raised:
             raise
@@ -79,14 +86,41 @@ def settings_from(config: DictConfig) -> RunSettings:
     Raises:
         ExneatError: a key is unknown, missing or of the wrong type, or a value is out of range.
     """
+    plain = plain_from(config)
+    _check_budgets(plain.get("budgets"))
+    return RunSettings.from_plain({key: value for key, value in plain.items() if key not in _NOT_OF_THE_RUN})
+
+
+def plain_from(config: DictConfig) -> dict[str, Any]:
+    """A composed configuration as dicts, lists, numbers and strings.
+
+    Raises:
+        ExneatError: a value is missing or refers to something that is not there.
+    """
     try:
         plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     except OmegaConfBaseException as error:
         raise ExneatError(_in_our_words(error)) from error
     assert isinstance(plain, dict)
-    _check_budgets(plain.get("budgets"))
-    settled = {str(key): value for key, value in plain.items() if key not in ("budget", "budgets")}
-    return RunSettings.from_plain(settled)
+    return {str(key): value for key, value in plain.items()}
+
+
+@contextmanager
+def composing() -> Iterator[Callable[[Sequence[str]], DictConfig]]:
+    """Gives a function from overrides to the composed configuration, for many compositions in a row.
+
+    Raises:
+        ExneatError: by that function, if the configuration cannot be composed.
+    """
+
+    def compose_one(overrides: Sequence[str]) -> DictConfig:
+        try:
+            return hydra.compose("config", overrides=list(overrides))
+        except HydraException as error:
+            raise ExneatError(_in_our_words(error)) from error
+
+    with hydra.initialize_config_dir(str(configuration_directory()), version_base="1.3"):
+        yield compose_one
 
 
 def _flags_first(program: str, arguments: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -131,7 +165,7 @@ def _refuse_shadowed_files(directory: Path) -> None:
 
 
 def _check_budgets(budgets: object) -> None:
-    fields = {"generations", "population", "episodes", "validation_episodes", "test_episodes"}
+    fields = {"generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes"}
     for name, budget in budgets.items() if isinstance(budgets, dict) else ():
         check_choice(f"budgets.{name}", name, ("paper", "quick", "smoke"))
         for key in budget if isinstance(budget, dict) else ():

@@ -10,9 +10,10 @@ from hydra.types import RunMode
 from omegaconf import DictConfig
 
 from exneat_cli.commands.composition import run_composed, settings_from
+from exneat_cli.commands.drawing import draw_what_is_missing
+from exneat_cli.commands.sweeps import sweeps_from
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory
-from exneat_cli.runs import progress_for_terminal, train
+from exneat_cli.runs import check_sweeps, progress_for_terminal, run_robustness, train
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -39,25 +40,24 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _draw_what_is_missing(directory: RunDirectory, fitness_name: str) -> None:
-    lacks_training = directory.history.exists() and not (directory.plots / "training.svg").exists()
-    lacks_path = not (directory.plots / "path.svg").exists()
-    if lacks_training or lacks_path:
-        from exneat_cli.analysis import draw_path, draw_training
-
-        if lacks_training:
-            draw_training(directory, fitness_name)
-        if lacks_path:
-            draw_path(directory)
-
-
 def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     settings = settings_from(config)
+    asked = sweeps_from(config, settings.task.name)
+    check_sweeps(settings, asked.sweeps, asked.episodes)
     finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")
-    _draw_what_is_missing(directory, settings.task.fitness_name)
+    tested = 0
+    if asked.sweeps:
+        tested = run_robustness(
+            directory,
+            asked.sweeps,
+            episodes=asked.episodes,
+            executor=settings.executor,
+            progress=progress_for_terminal(),
+        )
+    draw_what_is_missing(directory, settings.task.fitness_name, asked.labels, again=tested > 0)
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

@@ -4,6 +4,7 @@ from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.files import read_json, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
+from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
     DONE,
     FAILED,
@@ -19,14 +20,18 @@ __all__ = [
     "FAILED",
     "INTERRUPTED",
     "RUNNING",
+    "UNPERTURBED",
     "Champion",
     "HistoryRow",
+    "RobustnessRow",
     "RunDirectory",
     "configuration_hash",
     "find_runs",
+    "merge_robustness",
     "provenance",
     "read_champion",
     "read_json",
+    "read_robustness",
     "write_champion",
     "write_csv",
     "write_hall_of_fame",

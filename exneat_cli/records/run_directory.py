@@ -106,7 +106,7 @@ class RunDirectory:
             ExneatError: the directory cannot be made or used, or holds something else than this run finished.
         """
         is_new = self._make()
-        with self._locked():
+        with self.held():
             yield is_new or self._is_to_be_done(full_hash, resume)
 
     def _make(self) -> bool:
@@ -124,7 +124,12 @@ class RunDirectory:
         return True
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
+    def held(self) -> Iterator[None]:
+        """Hold the directory against other processes.
+
+        Raises:
+            ExneatError: another process holds it, or it cannot be opened.
+        """
         # The lock is on the directory itself: nothing is left behind, and a killed process frees it.
         try:
             descriptor = os.open(self.path, os.O_RDONLY)

@@ -18,9 +18,11 @@ from exneat_cli.records import (
     FAILED,
     INTERRUPTED,
     RUNNING,
+    UNPERTURBED,
     Champion,
     HistoryRow,
     RunDirectory,
+    merge_robustness,
     provenance,
     write_champion,
     write_csv,
@@ -29,24 +31,13 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Runner, Trace
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import Score, baseline, baseline_episodes, score_all, score_brains, summary_sentence
+from exneat_cli.runs.scores import baseline, robustness_row, score_all, score_brains, summary_sentence, tests_of
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
 from exneat_cli.wiring import UNTRAINED
 
 MANIFEST_FORMAT = 1
-ROBUSTNESS_COLUMNS = (
-    "arm",
-    "run_seed",
-    "parameter",
-    "level",
-    "episodes",
-    "fitness_mean",
-    "fitness_std",
-    "full_reward_mean",
-    "full_reward_std",
-)
 
 
 @dataclass(frozen=True)
@@ -169,19 +160,14 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
 
 def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
     acting = baseline(settings.task, settings.algorithm)
-    episodes = baseline_episodes(settings.seed, settings.test_episodes)
+    episodes = tests_of(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         (tested,) = score_all(runner.run(acting if isinstance(acting, RandomActions) else [acting], episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
         trace = runner.trace(acting, episodes[0])
     _write_trace(settings, directory, trace)
-    write_csv(directory.robustness, ROBUSTNESS_COLUMNS, [_unperturbed(settings, tested)])
+    merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
     return {"champion": asdict(tested), "standing_still": asdict(standing)}
-
-
-def _unperturbed(settings: RunSettings, tested: Score) -> tuple[object, ...]:
-    figures = (tested.fitness_mean, tested.fitness_std, tested.full_reward_mean, tested.full_reward_std)
-    return (settings.arm, settings.seed, "none", 0.0, tested.episodes, *figures)
 
 
 def _compile(settings: RunSettings, team: Team) -> Brain:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions, linear_fusion
+from exneat_cli.brains import Brain, RandomActions, linear_fusion, motionless
+from exneat_cli.records import RobustnessRow
 from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import Task
 
@@ -61,16 +63,27 @@ def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes
 
 
 def baseline(task: Task, algorithm: str) -> Brain | RandomActions:
-    """What acts for ``random`` or ``linear_fusion``."""
-    if algorithm == "linear_fusion":
-        return linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
-    return RandomActions(*task.action_bounds)
+    """What acts for ``random``, ``motionless`` or ``linear_fusion``."""
+    if algorithm == "random":
+        return RandomActions(*task.action_bounds)
+    if algorithm == "motionless":
+        return motionless(task.observation_size, task.resting_action)
+    return linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
 
 
-def baseline_episodes(root: int, episodes: int) -> list[EpisodeSeeds]:
-    """The test episodes, with actions at random from the run's own stream."""
+def tests_of(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
+    """The test episodes, equal for all runs and arms; random actions are drawn from the run's own stream."""
     tests = shared_episodes("test", episodes)
+    if settings.algorithm != "random":
+        return tests
+    root = settings.seed
     return [each._replace(actions=stream(root, "random_actions", k)) for k, each in enumerate(tests)]
+
+
+def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:
+    """A run's score at one level of a sweep."""
+    figures = (score.fitness_mean, score.fitness_std, score.full_reward_mean, score.full_reward_std)
+    return RobustnessRow(settings.arm, settings.seed, parameter, float(level), score.episodes, *figures)
 
 
 def summary_sentence(task: Task, result: dict[str, Any]) -> str:

@@ -27,7 +27,8 @@ class RunSettings:
 
     Attributes:
         task: what is learned.
-        algorithm: ``exneat``, ``neat``, or an untrained baseline, ``random`` or ``linear_fusion``.
+        algorithm: ``exneat``, ``neat``, or an untrained baseline: ``random``, ``motionless`` or
+            ``linear_fusion``.
         geometry, linkage, wiring: how modules are wired.
         noise: what disturbs the agent, in training, validation and test alike.
         evolution: how genomes change and compete; left out, what suits the task's kind of network.

@@ -11,8 +11,8 @@ from exneat_cli.wiring.geometry import Geometry
 from exneat_cli.wiring.linkage import LINKAGES, link_pins
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan, sensor_pins
 
-ALGORITHMS = ("exneat", "neat", "random", "linear_fusion")
-UNTRAINED = ("random", "linear_fusion")
+ALGORITHMS = ("exneat", "neat", "random", "motionless", "linear_fusion")
+UNTRAINED = ("random", "motionless", "linear_fusion")
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wi
 
     Args:
         task: gives sectors, trunk and sizes.
-        algorithm: ``neat`` (one module senses and drives everything) or ``exneat``; ``random``
-            and ``linear_fusion`` have no modules at all.
+        algorithm: ``neat`` (one module senses and drives everything) or ``exneat``; those of
+            `UNTRAINED` have no modules at all.
         geometry: which modules share genomes.
         linkage: one of `LINKAGES`.
         wiring: the central module's settings.

@@ -1,0 +1,136 @@
+"""Robustness of a finished run: its champion, or its baseline, under perturbations.
+
+Source of the protocol: Zhang (2025), section 3.4; every run's champion at every level, in worlds that are
+the same for all arms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import yaml
+
+from exneat_cli.brains import Brain, RandomActions
+from exneat_cli.errors import ConfigError, ExneatError, check_whole
+from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champion, read_robustness
+from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
+from exneat_cli.runs.progress import Progress, Silence
+from exneat_cli.runs.run import MANIFEST_FORMAT
+from exneat_cli.runs.scores import baseline, robustness_row, score_all, tests_of
+from exneat_cli.runs.settings import RunSettings
+from exneat_cli.wiring import UNTRAINED
+
+
+def load_settings(directory: RunDirectory) -> RunSettings:
+    """The settings of a finished run, from its own config.yaml.
+
+    Raises:
+        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged.
+    """
+    where = f"run={directory.path}"
+    if not directory.is_there():
+        raise ExneatError(f"{where}: no run is there; exneat inspect without run= lists them")
+    manifest = directory.read_manifest()
+    if manifest.get("format") != MANIFEST_FORMAT:
+        raise ExneatError(f"{where}: expected a run of format {MANIFEST_FORMAT}, got {manifest.get('format')!r}")
+    if manifest.get("status") != DONE:
+        mend = "finish it first: the command that began it, with resume=true"
+        raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {mend}")
+    try:
+        plain = yaml.safe_load(directory.config.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ExneatError(f"{directory.config}: could not be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ExneatError(f"{directory.config}: expected YAML, got something else") from error
+    if not isinstance(plain, dict):
+        raise ExneatError(f"{directory.config}: expected settings, got {type(plain).__name__}")
+    settings = RunSettings.from_plain(plain)
+    if settings.full_hash != manifest.get("configuration_hash"):
+        raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
+    return settings
+
+
+def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> bool:
+    """Whether the run of these settings is done and was tested at every level of `sweeps`."""
+    directory = settings.directory
+    if not directory.is_there():
+        return False
+    manifest = directory.read_manifest()
+    if manifest.get("status") != DONE or manifest.get("configuration_hash") != settings.full_hash:
+        return False
+    return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
+
+
+def missing_levels(directory: RunDirectory, sweep: Sweep, episodes: int) -> tuple[float, ...]:
+    """The levels that robustness.csv does not hold yet with that many episodes."""
+    there = {(row.parameter, row.level, row.episodes) for row in read_robustness(directory.robustness)}
+    return tuple(level for level in sweep.levels if (sweep.name, float(level), episodes) not in there)
+
+
+def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> None:
+    """Refuse what could not be run, before anything is.
+
+    Raises:
+        ConfigError: a sweep does not fit the task, a level is out of range, or there are no episodes.
+    """
+    check_whole("sweep.episodes", episodes, 1)
+    for sweep in sweeps:
+        for level in sweep.levels:
+            try:
+                perturbed(settings.task, settings.noise, sweep, level)
+            except ConfigError as error:
+                key, expected, came, mend = error.args
+                if key != "sweep":
+                    mend = f"level {level:g} of sweep {sweep.name} sets it; choose others with sweep.levels=[...]"
+                raise ConfigError(key, expected, came, mend) from error
+
+
+def run_robustness(
+    directory: RunDirectory,
+    sweeps: Sequence[Sweep],
+    *,
+    episodes: int,
+    executor: Executor,
+    progress: Progress | None = None,
+) -> int:
+    """Test a finished run at every level that is not in its robustness.csv yet; returns how many that were.
+
+    Args:
+        directory: of the run.
+        sweeps: what is perturbed.
+        episodes: test episodes per level, the same ones at all levels and for all runs.
+        executor: where episodes run.
+        progress: told what happens.
+
+    Raises:
+        ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
+    """
+    settings = load_settings(directory)
+    check_sweeps(settings, sweeps, episodes)
+    done = 0
+    with directory.held():
+        acting = _acting(directory, settings)
+        for sweep in sweeps:
+            levels = missing_levels(directory, sweep, episodes)
+            if not levels:
+                continue
+            (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
+            todo = Sweep(sweep.name, sweep.parameter, levels)
+            seeds = tests_of(settings, episodes)
+            rows = [
+                robustness_row(settings, sweep.name, level, score_all(outcomes)[0])
+                for level, outcomes in run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
+            ]
+            merge_robustness(directory.robustness, rows)
+            done += len(rows)
+    return done
+
+
+def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:
+    if settings.algorithm not in UNTRAINED:
+        champion = read_champion(directory.champion)
+        if champion.arm != settings.arm:
+            raise ExneatError(f"{directory.champion}: expected a champion of {settings.arm}, got {champion.arm}")
+        return [champion.brain()]
+    acting = baseline(settings.task, settings.algorithm)
+    return acting if isinstance(acting, RandomActions) else [acting]
