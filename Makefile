@@ -4,10 +4,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ant test check tests format bench wheel clean
+.PHONY: help ant test check tests format reproduce report bench wheel clean
+
+BUDGET ?= quick
+EXPERIMENTS := track_maze general_maze foraging hunting ant
+# One run per core, each on one thread: evolution itself is serial.
+WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
+SIDE_BY_SIDE := hydra/launcher=joblib hydra.launcher.n_jobs=$(WORKERS) executor=serial
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z%][a-z% -]*:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
 
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -15,7 +21,7 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 
 ant: $(VENV)/installed ## train ExNEAT on Ant (a few minutes) and say what was learned
-	@$(BIN)/exneat train task=ant geometry=all budget=quick resume=true
+	@$(BIN)/exneat train task=ant geometry=all budget=quick generations=40 resume=true
 
 test: check tests ## checks and tests
 
@@ -30,6 +36,22 @@ tests: $(VENV)/installed ## tests alone
 format: $(VENV)/installed ## bring the code into shape
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+sweep-%: $(VENV)/installed ## all runs of one experiment that are missing, e.g. make sweep-ant BUDGET=paper
+	$(BIN)/exneat sweep experiment=$* budget=$(BUDGET) $(SIDE_BY_SIDE)
+
+reproduce: $(VENV)/installed ## train what is missing of all experiments, then report: make reproduce BUDGET=quick|paper
+	@status=0; for experiment in $(EXPERIMENTS); do $(MAKE) --no-print-directory sweep-$$experiment || status=1; done; \
+	$(BIN)/exneat report budget=$(BUDGET) && exit $$status
+
+report: $(VENV)/installed ## every table and figure from the runs there are; trains nothing
+	$(BIN)/exneat report
+
+figure-%: $(VENV)/installed ## one figure, e.g. make figure-4.3
+	$(BIN)/exneat report only=$@
+
+table-%: $(VENV)/installed ## one table, e.g. make table-5.5
+	$(BIN)/exneat report only=$@
 
 bench: $(VENV)/installed ## how fast it is, as ratios (a few minutes on an idle machine)
 	$(BIN)/python -m tests.bench

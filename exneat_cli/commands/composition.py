@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import hydra
+from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -56,7 +58,7 @@ def run_composed(
         config_name: file in conf/ that the composition starts from.
 
     Raises:
-        ExneatError: the configuration cannot be composed.
+        ExneatError: the configuration cannot be composed, or `job` raised it.
     """
     raised: list[BaseException] = []
 
@@ -65,6 +67,8 @@ def run_composed(
             job(config)
         except BaseException as error:
             raised.append(error)
+            if isinstance(error, ExneatError) and HydraConfig.get().mode is not RunMode.MULTIRUN:
+                return  # raised below: Hydra would print lines of its own about it
             raise
 
     os.environ["HYDRA_FULL_ERROR"] = "1"
@@ -78,6 +82,8 @@ def run_composed(
         if error in raised:
             raise
         raise ExneatError(_in_our_words(error)) from error
+    if raised:
+        raise raised[0]
 
 
 def settings_from(config: DictConfig) -> RunSettings:
@@ -179,6 +185,9 @@ def _in_our_words(error: Exception) -> str:
     if unknown := re.search(r"Could not find '(.+)/(.+?)'", text):
         options = re.search(r"Available options in '.+':\n((?:\t.+\n?)+)", text)
         known = ", ".join(options[1].split()) if options else "none"
+        return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
+    if unknown := re.search(r"Could not load '(.+)/(.+?)'", text):
+        known = ", ".join(sorted(path.stem for path in (configuration_directory() / unknown[1]).glob("*.yaml")))
         return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
     if dangling := re.search(r"Interpolation key '(.+?)' not found\s+full_key: (\S+)", text):
         return f"{dangling[2]}: refers to {dangling[1]}, which no configuration file and no override sets"

@@ -161,9 +161,7 @@ def _overrides(key: str, values: object) -> Mapping[str, Any]:
         raise ConfigError(key, "settings by name, as on the command line, or {}", values)
     for name in values:
         if name in _FORBIDDEN:
-            raise ConfigError(
-                f"{key}.{name}", "a setting of the arm or condition", values[name], "exneat sets this one"
-            )
+            raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", values[name])
     return values
 
 

@@ -57,9 +57,7 @@ def _sorted_arguments(arguments: Sequence[str]) -> tuple[str, list[str], list[st
         else:
             overrides.append(argument)
     if not name:
-        raise ExneatError(
-            "experiment: expected experiment=<name>, e.g. exneat sweep experiment=track_maze budget=quick"
-        )
+        raise ExneatError("experiment: expected a name or a YAML file, e.g. exneat sweep experiment=track_maze")
     return name, for_hydra, overrides
 
 

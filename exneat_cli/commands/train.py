@@ -22,7 +22,6 @@ def run(arguments: Sequence[str]) -> int:
     Raises:
         ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
-    refused: list[ExneatError] = []
 
     def job(config: DictConfig) -> None:
         try:
@@ -32,11 +31,9 @@ def run(arguments: Sequence[str]) -> int:
                 # Raised again at the end of the multirun by Hydra, also where jobs run in other processes.
                 print(f"exneat: {' '.join(HydraConfig.get().overrides.task)}: {error}", file=sys.stderr)
                 raise ExneatError("at least one job of the multirun failed; see above") from error
-            refused.append(error)
+            raise
 
     run_composed("exneat train", arguments, job)
-    if refused:
-        raise refused[0]
     return 0
 
 

@@ -56,7 +56,7 @@ class RunSettings:
     evolution: EvolutionSettings = None  # type: ignore[assignment]
     executor: Executor = field(default_factory=Executor)
     seed: int = 0
-    generations: int = 40
+    generations: int = 25
     population: int = 100
     episodes: int = 1
     pairing: str = "rank"

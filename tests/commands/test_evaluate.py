@@ -1,0 +1,160 @@
+"""`exneat evaluate` and `exneat train sweep=...`: robustness of finished runs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from exneat_cli.commands.composition import composing, configuration_directory
+from exneat_cli.commands.sweeps import sweeps_from
+from exneat_cli.main import main
+from exneat_cli.records import RobustnessRow, RunDirectory, read_robustness
+from exneat_cli.rollouts import Noise, perturbed
+from exneat_cli.tasks import TASKS
+
+SWEEPS = sorted(path.stem for path in (configuration_directory() / "sweep").glob("*.yaml") if path.stem != "none")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("outputs")
+    for algorithm in ("neat", "random", "motionless", "linear_fusion"):
+        assert main(["train", "task=track_maze", "budget=smoke", f"algorithm={algorithm}", f"output={output}"]) == 0
+    return output / "track_maze"
+
+
+def rows_of(runs: Path, arm: str) -> list[RobustnessRow]:
+    (directory,) = runs.glob(f"{arm}-*")
+    return read_robustness(RunDirectory(directory).robustness)
+
+
+def evaluate(*arguments: str) -> int:
+    return main(["evaluate", "sweep.episodes=3", *arguments])
+
+
+def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
+    for arm in ("neat", "random", "motionless", "linear_fusion"):
+        rows = rows_of(runs, arm)
+        assert [row.level for row in rows if row.parameter == "gap"] == [0, 1, 2, 3, 4, 5]
+        assert len([row for row in rows if row.parameter == "sensor_noise"]) == 11
+        assert {row.episodes for row in rows if row.parameter != "none"} == {3}
+    before = {path: path.read_bytes() for path in runs.rglob("robustness.*")}
+    assert len([path for path in before if path.suffix == ".svg"]) == 4
+    capsys.readouterr()
+    assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
+    assert capsys.readouterr().out.count("all there already") == 4
+    assert {path: path.read_bytes() for path in runs.rglob("robustness.*")} == before
+
+
+def test_other_levels_join_those_that_are_there(runs: Path) -> None:
+    (neat,) = runs.glob("neat-*")
+    assert evaluate(f"run={neat}", "sweep=maze_size", "sweep.levels=[9]") == 0
+    assert evaluate(f"run={neat}", "sweep=maze_size", "sweep.levels=[7]") == 0
+    assert [row.level for row in rows_of(runs, "neat") if row.parameter == "maze_size"] == [7, 9]
+
+
+def test_without_noise_fusion_is_perfect_and_standing_still_gets_a_quarter(runs: Path) -> None:
+    assert evaluate(f"run={runs}/*", "sweep=sensor_noise", "sweep.levels=[0]") == 0
+    clean = {
+        arm: next(row for row in rows_of(runs, arm) if (row.parameter, row.level) == ("sensor_noise", 0.0))
+        for arm in ("motionless", "linear_fusion")
+    }
+    assert clean["linear_fusion"].fitness_mean == 1.0
+    assert clean["motionless"].fitness_mean == 0.25
+
+
+def test_training_with_a_sweep_ends_with_its_rows_and_another_sweep_does_not_train_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["train", "task=hunting", "budget=smoke", f"output={tmp_path}"]
+    assert main([*common, "sweep=p_m", "sweep.levels=[0,1]"]) == 0
+    assert [row.level for row in rows_of(tmp_path / "hunting", "exneat")] == [0, 1]
+    capsys.readouterr()
+    assert main([*common, "sweep=p_e", "sweep.levels=[0.5]"]) == 0
+    assert "finished already" in capsys.readouterr().out
+    assert len(rows_of(tmp_path / "hunting", "exneat")) == 3
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_every_level_of_every_sweep_suits_the_tasks_that_it_names(sweep: str) -> None:
+    entry = yaml.safe_load((configuration_directory() / "sweep" / f"{sweep}.yaml").read_text())["sweeps"][sweep]
+    assert entry["levels"]
+    with composing() as compose:
+        for task in entry["levels"]:
+            (asked,) = sweeps_from(compose([f"task={task}", f"sweep={sweep}"]), task).sweeps
+            for level in asked.levels:
+                perturbed(TASKS[task](), Noise(), asked, level)
+
+
+BAD = [
+    ([], "sweep: expected what to perturb"),
+    (["sweep=gap"], "run: expected a run directory"),
+    (["run={run}"], "sweep: expected what to perturb"),
+    (["run={run}", "sweep=wind"], "sweep=wind: no such option; known:"),
+    (["run={run}", "sweep=p_m"], "sweep: expected a sweep that fits task=track_maze, got 'p_m'"),
+    (["run={run}", "sweep=reset_noise"], "sweep: expected a sweep that fits task=track_maze"),
+    (["run={run}", "sweep=reset_noise", "sweep.levels=[0.2]"], "no initial pose"),
+    (["run={run}", "sweep=gap", "sweep.levels=[9]"], "level 9 of sweep gap"),
+    (["run={run}", "sweep=gap", "sweep.levels=[0.5]"], "task.gap: expected a whole number"),
+    (["run={run}", "sweep=sensor_noise", "sweep.levels=[-1]"], "noise.sensor_std: expected"),
+    (["run={run}", "sweep=sensor_noise", "sweep.levels=[]"], "sweep.levels: expected at least one level"),
+    (["run={run}", "sweep=sensor_noise", "sweep.levels=0.1"], "sweep.levels: expected a list"),
+    (["run={run}", "sweep=sensor_noise", "sweep.levels=[a]"], "sweep.levels: expected finite numbers"),
+    (["run={run}", "sweep=sensor_noise", "sweep.level=[1]"], "sweep.level: unknown key"),
+    (["run={run}", "sweep=sensor_noise", "+sweep.level=[1]"], "sweep.level: unknown key"),
+    (["run={run}", "sweep=sensor_noise", "sweep.episodes=0"], "sweep.episodes: expected"),
+    (["run={run}", "sweep=sensor_noise", "+seed=1"], "seed: unknown key"),
+    (["run={run}", "sweep=sensor_noise", "executor.workers=-1"], "executor.workers: expected"),
+    (["run={run}/nowhere", "sweep=gap"], "no run is there"),
+    (["run={run}/*x", "sweep=gap"], "run: expected a run directory, or a pattern that fits some"),
+]
+
+
+@pytest.mark.parametrize(("given", "named"), BAD, ids=[" ".join(given) or "nothing" for given, _ in BAD])
+def test_bad_input_is_refused_in_three_lines_and_leaves_no_row(
+    runs: Path, capsys: pytest.CaptureFixture[str], given: list[str], named: str
+) -> None:
+    (run,) = runs.glob("motionless-*")
+    before = {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()}
+    assert main(["evaluate", *(argument.format(run=run) for argument in given)]) == 2
+    message = capsys.readouterr().err
+    assert named in message
+    assert "Traceback" not in message
+    assert len(message.strip().splitlines()) <= 3
+    assert {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()} == before
+
+
+def spoil_manifest(run: RunDirectory, **entries: object) -> None:
+    run.manifest.write_text(json.dumps({**run.read_manifest(), **entries}))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (lambda run: spoil_manifest(run, format=99), "expected a run of format 1, got 99"),
+        (lambda run: spoil_manifest(run, status="running"), "expected a finished run, got status 'running'"),
+        (lambda run: spoil_manifest(run, configuration_hash="0"), "does not describe the run beside it"),
+        (lambda run: run.manifest.write_text("{"), "expected JSON"),
+        (lambda run: run.config.write_text("[1]"), "expected settings, got list"),
+        (lambda run: run.config.write_text("a: [\t"), "expected YAML"),
+        (lambda run: run.config.unlink(), "could not be read"),
+        (lambda run: run.champion.unlink(), "could not be read"),
+        (lambda run: run.champion.write_text("{}"), "expected a champion of format"),
+        (lambda run: run.robustness.write_text("x"), "expected a table"),
+    ],
+)
+def test_a_damaged_or_half_written_run_is_refused_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: object, named: str
+) -> None:
+    assert main(["train", "task=track_maze", "budget=smoke", f"output={tmp_path}"]) == 0
+    (path,) = (tmp_path / "track_maze").iterdir()
+    spoil(RunDirectory(path))  # type: ignore[operator]
+    capsys.readouterr()
+    assert main(["evaluate", f"run={path}", "sweep=gap"]) == 2
+    message = capsys.readouterr().err
+    assert named in message
+    assert len(message.strip().splitlines()) <= 3

@@ -1,0 +1,195 @@
+"""`exneat sweep`: experiments as data, jobs that stand alone, and a summary that tells the truth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from exneat_cli.commands.experiments import experiment_names, plan_jobs, read_experiment
+from exneat_cli.main import main
+from exneat_cli.records import RunDirectory, read_robustness
+
+SMALL = {
+    "claim": "Modules beat one network.",
+    "settings": {"task": "track_maze"},
+    "arms": {
+        "neat": {"label": "NEAT", "settings": {"algorithm": "neat"}},
+        "exneat": {"label": "ExNEAT", "settings": {"geometry": "custom", "geometry.vector": [0, 0, 1, 1]}},
+    },
+    "conditions": {
+        "gap_1": {"label": "gap of 1", "settings": {"task.gap": 1}, "sweeps": ["gap"]},
+        "clean": {"label": "clean", "settings": {}},
+    },
+    "runs": {"smoke": 1, "quick": 2},
+}
+
+
+def write(folder: Path, **changes: object) -> Path:
+    path = folder / "small.yaml"
+    path.write_text(yaml.safe_dump({**SMALL, **changes}))
+    return path
+
+
+def sweep(folder: Path, *arguments: str) -> int:
+    path = folder / "small.yaml"
+    return main(["sweep", f"experiment={path}", "budget=smoke", f"output={folder / 'out'}", *arguments])
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path)
+    assert sweep(tmp_path) == 0
+    assert "4 runs done, 0 skipped as finished before, 0 failed" in capsys.readouterr().out
+    folders = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert folders == ["small-clean-smoke", "small-gap_1-smoke"]
+    for run in (tmp_path / "out").glob("*/*"):
+        levels = [row.level for row in read_robustness(RunDirectory(run).robustness)]
+        assert levels == ([0, 1, 2, 3, 4, 5] if "gap_1" in str(run) else [])
+        assert {"training.svg", "path.svg", "network.svg"} <= {path.name for path in (run / "plots").iterdir()}
+    before = contents(tmp_path / "out")
+    assert sweep(tmp_path) == 0
+    assert "0 runs done, 4 skipped as finished before, 0 failed" in capsys.readouterr().out
+    assert contents(tmp_path / "out") == before
+
+
+def test_a_job_that_fails_leaves_the_others_alone_and_is_named_at_the_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path)
+    jobs = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])
+    spoilt = jobs[1].settings.directory.path
+    spoilt.parent.mkdir(parents=True)
+    spoilt.write_text("in the way")
+    assert sweep(tmp_path) == 1
+    shown = capsys.readouterr()
+    assert "3 runs done, 0 skipped as finished before, 1 failed" in shown.out
+    assert shown.err.splitlines()[-2].startswith(f"  {jobs[1].name}: {spoilt}: expected a directory, got a file")
+    assert [job.is_finished() for job in jobs] == [True, False, True, True]
+    spoilt.unlink()
+    assert sweep(tmp_path) == 0
+    assert "1 runs done, 3 skipped as finished before, 0 failed" in capsys.readouterr().out
+
+
+def test_a_run_that_was_trained_but_not_tested_is_finished_without_training_again(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert sweep(tmp_path) == 0
+    (run,) = (tmp_path / "out").glob("small-gap_1-smoke/neat-*")
+    rows = (run / "robustness.csv").read_bytes()
+    history = (run / "history.csv").stat().st_mtime_ns
+    (run / "robustness.csv").unlink()
+    assert sweep(tmp_path) == 0
+    assert (run / "robustness.csv").read_bytes() == rows
+    assert (run / "history.csv").stat().st_mtime_ns == history
+
+
+def test_side_by_side_gives_the_same_bytes(tmp_path: Path) -> None:
+    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    write(tmp_path)
+    assert sweep(tmp_path) == 0
+    (tmp_path / "out").rename(tmp_path / "one")
+    assert sweep(tmp_path, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial") == 0
+
+    def results(folder: str) -> dict[str, object]:
+        kept = ("champion.json", "robustness.csv", "trace.csv")
+        paths = [path for path in (tmp_path / folder).rglob("*") if path.name in kept]
+        return {str(path.relative_to(tmp_path / folder)): path.read_bytes() for path in paths}
+
+    assert results("out") == results("one")
+    assert len(results("one")) == 10
+
+
+def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None:
+    experiment = read_experiment(str(write(tmp_path)))
+    jobs = plan_jobs(experiment, "quick", ["generations=3", "task.gap=2", "seed=7"])
+    assert {job.settings.generations for job in jobs} == {3}
+    assert {job.settings.task.gap for job in jobs} == {2}  # type: ignore[attr-defined]
+    assert sorted({job.settings.seed for job in jobs}) == [7, 8]
+
+
+@pytest.mark.parametrize("name", experiment_names())
+@pytest.mark.parametrize("budget", ["paper", "quick", "smoke"])
+def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, budget: str) -> None:
+    jobs = plan_jobs(read_experiment(name), budget)
+    assert len({job.settings.directory.path for job in jobs}) == len(jobs) == len({job.name for job in jobs})
+
+
+def test_experiments_have_ten_runs_on_paper_and_three_when_quick() -> None:
+    for name in experiment_names():
+        assert read_experiment(name).runs == {"paper": 10, "quick": 3, "smoke": 1}
+
+
+BAD_FILES = [
+    ({"arms": {}}, "arms: expected at least one entry"),
+    ({"conditions": {}}, "conditions: expected at least one entry"),
+    ({"arms": {"neat": {"label": "NEAT"}}}, "expected claim, settings, arms, conditions and runs"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": [1]}}}, "arms.neat.settings: expected settings by name"),
+    ({"arms": {"a/b": {"label": "NEAT", "settings": {}}}}, "a/b: expected a short name"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {"seed": 3}}}}, "arms.neat.settings.seed: expected another"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "runs": 0}}}, "arms.neat.runs: expected"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {"algorithm": "nead"}}}}, "algorithm=nead: no such option"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "sed: unknown key"),
+    ({"conditions": {"a": {"label": "a", "settings": {"task.gap": 99}}}}, "task.gap: expected"),
+    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["p_m"]}}}, "fits task=track_maze"),
+    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["wind"]}}}, "sweep=wind: no such option"),
+    ({"runs": {"smoke": 0}}, "runs.smoke: expected"),
+    ({"runs": {"quick": 1}}, "budget: expected one of quick, got 'smoke'"),
+    ({"runs": {"large": 1}}, "runs: expected one of paper, quick, smoke, got 'large'"),
+    ({"claims": "two"}, "claims: unknown key"),
+]
+
+
+@pytest.mark.parametrize(("changes", "named"), BAD_FILES, ids=[named for _, named in BAD_FILES])
+def test_an_experiment_that_makes_no_sense_is_refused_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, object], named: str
+) -> None:
+    write(tmp_path, **changes)
+    assert sweep(tmp_path) == 2
+    message = capsys.readouterr().err
+    assert named in message
+    assert len(message.strip().splitlines()) <= 3
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ([], "experiment: expected a name or a YAML file"),
+        (["experiment=chess"], "experiment: expected one of ant, foraging"),
+        (["experiment=nowhere.yaml"], "could not be read"),
+        (["experiment=ant", "budget=huge"], "budget: expected one of paper, quick, smoke"),
+        (["experiment=ant", "sed=3"], "sed: unknown key"),
+        (["experiment=ant", "--fast"], "--fast: unknown flag"),
+        (["experiment=ant", "generations=0"], "generations: expected"),
+    ],
+)
+def test_a_command_line_that_makes_no_sense_is_refused_before_anything_runs(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    named: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["sweep", *arguments]) == 2
+    message = capsys.readouterr().err
+    assert named in message
+    assert len(message.strip().splitlines()) <= 3
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    assert sweep(tmp_path) == 0
+    job = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])[0]
+    assert job.is_finished()
+    manifest = job.settings.directory.manifest
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "status": "running"}))
+    assert not job.is_finished()
