@@ -20,6 +20,7 @@ STREAMS = {
     "validation": 5,
     "test": 6,
     "random_actions": 7,
+    "bootstrap": 8,
 }
 """Purpose -> first entry of the spawn key. Numbers are never reused: results depend on them."""
 

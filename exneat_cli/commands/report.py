@@ -9,10 +9,11 @@ from pathlib import Path
 
 from exneat_cli.analysis.artefacts import Built
 from exneat_cli.analysis.catalogue import FigurePlan, Panel, TablePlan, read_catalogue
+from exneat_cli.analysis.comparisons import build_comparison
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
-from exneat_cli.analysis.tables import build_comparison, build_table
+from exneat_cli.analysis.tables import build_table
 from exneat_cli.commands.experiments import (
     Experiment,
     experiment_names,
@@ -68,7 +69,7 @@ def run(arguments: Sequence[str]) -> int:
     built, missing = _build(request, artefacts, studies)
     if request.only is None:
         built += [build_comparison(study, request.directory) for study in studies.values() if study.finished]
-        page = write_index(request.directory, built, missing, studies)
+        page = write_index(request.directory, studies, built, missing)
         print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs")
         print(page)
     return 0
@@ -159,10 +160,10 @@ def _largest_budget(experiment: Experiment, output: str) -> str:
 
 def _build(
     request: Request, artefacts: Mapping[str, FigurePlan | TablePlan], studies: Mapping[str, Study]
-) -> tuple[list[Built], list[tuple[str, str]]]:
+) -> tuple[list[Built], dict[str, str]]:
     """What was built, and what was not: its name and why."""
     built: list[Built] = []
-    missing: list[tuple[str, str]] = []
+    missing: dict[str, str] = {}
     for name, artefact in artefacts.items():
         try:
             if isinstance(artefact, FigurePlan):
@@ -172,7 +173,7 @@ def _build(
         except MissingRunsError as error:
             if request.only is not None:
                 raise ExneatError(f"{name}: {error}") from error
-            missing.append((name, str(error)))
+            missing[name] = str(error)
             print(f"{name}: {error}", file=sys.stderr)
         else:
             print("\n".join(str(path) for path in built[-1].paths), flush=True)

@@ -1,0 +1,104 @@
+"""Studies whose runs are made up: directories with the files that tables and pages read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from exneat_cli.analysis.study import PlannedRun, Study
+from exneat_cli.records import DONE, HistoryRow, RunDirectory, write_csv, write_history, write_json
+
+Levels = Mapping[tuple[str, float], tuple[float, float]]
+"""(sweep, level) -> mean fitness and mean full reward."""
+
+
+def plan_study(
+    directory: Path,
+    *,
+    arms: Mapping[str, str] | None = None,
+    baselines: Sequence[str] = ("random",),
+    conditions: Mapping[str, str] | None = None,
+    seeds: int = 3,
+    experiment: str = "track",
+    budget: str = "quick",
+    has_full_reward: bool = False,
+) -> Study:
+    """A study none of whose runs is finished."""
+    arms = arms or {"neat": "NEAT", "exneat": "ExNEAT", "random": "random actions"}
+    conditions = conditions or {"calm": "no noise", "noisy": "much noise"}
+    runs = tuple(
+        PlannedRun(condition, arm, seed, RunDirectory(directory / experiment / f"{condition}-{arm}-s{seed}"))
+        for condition in conditions
+        for arm in arms
+        for seed in range(1 if arm in baselines else seeds)
+    )
+    return Study(
+        experiment=experiment,
+        budget=budget,
+        claim="Small networks learn faster.",
+        command=f"exneat sweep experiment={experiment} budget={budget}",
+        fitness_name="fitness",
+        has_full_reward=has_full_reward,
+        arms=arms,
+        baselines=tuple(baselines),
+        conditions=conditions,
+        sweeps={"sensor_noise": "sensor noise (sd)"},
+        runs=runs,
+    )
+
+
+def finish(
+    run: PlannedRun,
+    curve: Sequence[float] = (),
+    *,
+    test: float = 0.5,
+    full_reward: float = 0.5,
+    validation: float = 0.5,
+    levels: Levels | None = None,
+    episodes: int = 400,
+    env_steps: int = 9000,
+    versions: Mapping[str, str] | None = None,
+) -> None:
+    """Write what a finished run leaves; without a curve it is that of a baseline."""
+    directory = run.directory
+    directory.path.mkdir(parents=True)
+    champion = {"episodes": 20, "fitness_mean": test, "full_reward_mean": full_reward}
+    manifest: dict[str, object] = {
+        "status": DONE,
+        "arm": run.arm,
+        "seed": run.seed,
+        "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"}),
+    }
+    result: dict[str, object] = {"champion": champion}
+    if curve:
+        write_history(
+            directory.history,
+            [HistoryRow(g, b, b, b, b, g, g, 1, 9, 0, 0, 0, 0.1 * g) for g, b in enumerate(curve, start=1)],
+        )
+        manifest["budget_spent"] = {"episodes": episodes, "env_steps": env_steps, "wall_seconds": 90.5}
+        result = {"training": curve[-1], "validation": validation, **result}
+    if levels is not None:
+        rows = [(run.arm, run.seed, *place, 20, f, 0.0, full, 0.0) for place, (f, full) in levels.items()]
+        columns = ("arm", "run_seed", "parameter", "level", "episodes", "fitness_mean", "fitness_std")
+        write_csv(directory.robustness, (*columns, "full_reward_mean", "full_reward_std"), rows)
+    write_json(directory.manifest, {**manifest, "result": result})
+
+
+def finish_all(study: Study, levels: Levels | None = None) -> Study:
+    """Finish every run: later arms and seeds do better; returns a study that sees them."""
+    rank = {arm: k for k, arm in enumerate(study.arms)}
+    for run in study.runs:
+        end = 0.3 + 0.1 * rank[run.arm] + 0.013 * run.seed
+        curve = () if run.arm in study.baselines else (0.5 * end, end, end)
+        finish(run, curve, test=end - 0.05, full_reward=end + 1.0, validation=end, levels=levels)
+    return seen_anew(study)
+
+
+def seen_anew(study: Study) -> Study:
+    """The same study without what it remembers of its runs."""
+    return Study(**{name: getattr(study, name) for name in Study.__dataclass_fields__})
+
+
+def run_of(study: Study, condition: str, arm: str, seed: int) -> PlannedRun:
+    """One planned run."""
+    return next(run for run in study.runs if (run.condition, run.arm, run.seed) == (condition, arm, seed))

@@ -1,0 +1,146 @@
+"""`exneat report`: every figure and table of the catalogue from smoke runs, and plain words for what is missing."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from exneat_cli.analysis.catalogue import read_catalogue
+from exneat_cli.commands.experiments import experiment_names, experiments_directory, read_experiment
+from exneat_cli.main import main
+
+CATALOGUE = read_catalogue(experiments_directory() / "catalogue.yaml")
+IDS = [
+    *(f"figure-4.{k}" for k in range(1, 21)),
+    *(f"figure-5.{k}" for k in range(1, 8)),
+    *(f"figure-7.{k}" for k in range(1, 10)),
+    *(f"table-5.{k}" for k in range(1, 6)),
+]
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All five experiments at smoke size."""
+    output = tmp_path_factory.mktemp("smoke") / "outputs"
+    for name in experiment_names():
+        assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
+    return output
+
+
+def report(output: Path, *arguments: str) -> int:
+    return main(["report", f"output={output}", *arguments])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_catalogue_has_every_figure_and_table_of_the_thesis() -> None:
+    assert sorted(CATALOGUE) == sorted(IDS)
+
+
+def test_every_id_builds_from_smoke_runs_and_a_second_report_leaves_the_same_bytes(
+    outputs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(outputs)
+    assert report(outputs) == 0
+    shown = capsys.readouterr()
+    made = contents(outputs / "report")
+    for name in IDS:
+        kinds = ("csv", "md") if name.startswith("table") else ("png", "svg")
+        assert {f"{name}.{kind}" for kind in kinds} <= set(made), f"{name}: {shown.err}"
+    assert "index.html" in made
+    assert "0 lack runs" in shown.out
+    assert report(outputs) == 0
+    assert contents(outputs / "report") == made
+    assert {path: data for path, data in contents(outputs).items() if not path.startswith("report")} == before
+
+
+def test_one_thing_alone_is_built_and_its_axis_can_be_chosen(outputs: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "outputs"
+    shutil.copytree(outputs / "track_maze-noise_0.05-smoke", copy / "track_maze-noise_0.05-smoke")
+    assert report(copy, "only=figure-4.1") == 0
+    by_generation = contents(copy / "report")
+    assert sorted(by_generation) == ["figure-4.1.png", "figure-4.1.svg"]
+    assert report(copy, "only=figure-4.1", "axis=env_steps") == 0
+    assert contents(copy / "report")["figure-4.1.svg"] != by_generation["figure-4.1.svg"]
+
+
+def test_what_is_missing_is_named_with_the_command_that_makes_it_and_the_rest_is_built(
+    outputs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "outputs"
+    for condition in ("noise_0.05", "gap_2", "size_17"):
+        shutil.copytree(outputs / f"track_maze-{condition}-smoke", copy / f"track_maze-{condition}-smoke")
+    assert report(copy) == 0
+    shown = capsys.readouterr()
+    assert (copy / "report" / "figure-4.2.svg").exists()
+    assert (copy / "report" / "table-5.1.csv").exists()
+    assert not (copy / "report" / "figure-7.2.svg").exists()
+    assert f"exneat sweep experiment=track_maze budget=smoke output={copy}" in shown.err
+    assert "exneat sweep experiment=ant" in shown.err
+    assert "exneat sweep experiment=ant" in (copy / "report" / "index.html").read_text()
+    assert report(copy, "only=figure-7.2") == 2
+    message = capsys.readouterr().err
+    assert "no finished run of NEAT" in message
+    assert len(message.strip().splitlines()) <= 3
+
+
+def test_an_experiment_of_the_users_own_gets_figures_and_a_comparison(tmp_path: Path) -> None:
+    own = {
+        "claim": "It works with mine.",
+        "settings": {"task": "hunting"},
+        "arms": {
+            "one": {"label": "one", "settings": {"algorithm": "neat"}},
+            "four": {"label": "four", "settings": {"geometry": "all"}},
+        },
+        "conditions": {"calm": {"label": "calm", "settings": {"task.p_m": 0.1}, "sweeps": ["p_m"]}},
+        "runs": {"smoke": 2},
+    }
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(own))
+    output = tmp_path / "outputs"
+    assert main(["sweep", f"experiment={path}", "budget=smoke", f"output={output}"]) == 0
+    assert report(output, f"experiment={path}", "budget=smoke") == 0
+    made = set(contents(output / "report"))
+    assert {"training-calm.svg", "robustness-calm-p_m.svg", "comparison-mine.csv", "index.html"} <= made
+    assert "It works with mine." in (output / "report" / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ([], "no finished run of ant"),
+        (["only=figure-9.9"], "only: expected one of figure-4.1"),
+        (["only=figure-4.1"], "no finished run of track_maze"),
+        (["budget=huge"], "budget: expected one of paper, quick, smoke"),
+        (["axis=time"], "axis: expected one of generation, episodes, env_steps"),
+        (["experiment=chess"], "experiment: expected one of ant"),
+        (["experiment=nowhere.yaml"], "could not be read"),
+        (["--all"], "--all: expected key=value"),
+        (["sed=3"], "sed: unknown key"),
+    ],
+)
+def test_bad_input_is_refused_in_three_lines_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], named: str
+) -> None:
+    assert report(tmp_path / "outputs", *arguments) == 2
+    message = capsys.readouterr().err
+    assert named in message
+    assert "Traceback" not in message
+    assert len(message.strip().splitlines()) <= 3
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_condition_and_arm_of_the_catalogue_is_one_of_its_experiment() -> None:
+    experiments = {name: read_experiment(name) for name in experiment_names()}
+    for artefact in CATALOGUE.values():
+        for part in getattr(artefact, "panels", ()) or getattr(artefact, "rows", ()):
+            experiment = experiments[part.experiment]
+            assert part.condition in experiment.conditions
+            assert part.arm is None or part.arm in experiment.arms
+            if getattr(part, "sweep", None):
+                assert part.sweep in experiment.conditions[part.condition].sweeps
