@@ -12,7 +12,7 @@ from exneat_cli.tasks.grid import COLUMN, MOVES, ROW
 from exneat_cli.tasks.maze_dynamics import GOAL_COLUMN, GOAL_ROW
 from exneat_cli.tasks.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.predator_prey import Foraging, Hunting
-from exneat_cli.tasks.prey_dynamics import FREE, PREY_COLUMN, PREY_ROW, Field
+from exneat_cli.tasks.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field
 from exneat_cli.tasks.task import RUNNING
 
 WORLDS: dict[str, type[TrackMaze] | type[GeneralMaze] | type[Foraging]] = {

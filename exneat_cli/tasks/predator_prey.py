@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
 from exneat_cli.tasks import prey_dynamics
 from exneat_cli.tasks.grid import CHANNELS, GridTask
-from exneat_cli.tasks.prey_dynamics import Field, new_field
+from exneat_cli.tasks.prey_field import Field, new_field
 from exneat_cli.tasks.task import Simulation
 
 MOTIONS = ("levy", "brownian")
