@@ -157,9 +157,10 @@ class Runner:
         if isinstance(brains, RandomActions):
             low, high = brains
             brains = [motionless(task.observation_size, np.zeros(len(low)))]
-        if not brains or any(sizes(brain) != (task.observation_size, actions) for brain in brains):
-            expected = f"{task.observation_size} inputs and {actions} actions"
-            raise ValueError(f"brains: expected at least one, each for {expected} of {task.name}")
+        expected, came = (task.observation_size, actions), {sizes(brain) for brain in brains}
+        if came != {expected}:
+            what = f"sizes {expected} of observation and action"
+            raise ValueError(f"brains: expected at least one, each of {what}, got {sorted(came)}")
         lowest, highest = task.observation_limits
         conditions = Conditions(float(self._noise.sensor_std), float(lowest), float(highest), low, high - low)
         return _Crew(lay_out(brains), conditions)

@@ -67,11 +67,15 @@ class Foraging(GridTask):
         check_whole("task.patch_width", self.patch_width, 1, 15)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
-        per_step = (self.size + 2) ** 2 * self.n_prey * (CHANNELS if self.emits_both else 1)
-        if self.steps * per_step > MOST_CUES:
-            most = MOST_CUES // per_step
-            mend = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
-            raise ConfigError("task.steps", f"at most {most} for this size and n_prey", self.steps, mend)
+        self._check_cues((self.size + 2) ** 2 * (CHANNELS if self.emits_both else 1))
+
+    def _check_cues(self, per_prey: int) -> None:
+        mend = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
+        most_prey, most_steps = MOST_CUES // per_prey, MOST_CUES // (per_prey * self.n_prey)
+        if self.n_prey > most_prey:
+            raise ConfigError("task.n_prey", f"at most {most_prey} for this size", self.n_prey, mend)
+        if self.steps > most_steps:
+            raise ConfigError("task.steps", f"at most {most_steps} for this size and n_prey", self.steps, mend)
 
     @property
     def trace_columns(self) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains.brain import activate, fresh_memory
-from exneat_cli.rollouts import Job, Runner
+from exneat_cli.brains import Brain
+from exneat_cli.brains.brain import activate, lay_out, memory_size
+from exneat_cli.rollouts import Runner
 from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import RUNNING, Simulation
 from exneat_cli.tasks.ant_dynamics import AntWorld
@@ -49,41 +50,40 @@ def replay(world: AntWorld, controls: NDArray[np.float64]) -> None:
 def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
     """Environment steps per second, on one thread, over those of the bare physics with equal controls.
 
-    The bare loop's time leaves out the resets; ours has them, and everything else that a job costs.
+    The bare loop's time leaves out the resets; ours has them, and everything else that a run costs.
 
     Raises:
         VerificationError: a replay did not end where the episode did.
     """
-    jobs = workload.jobs()
+    seeds = workload.seeds
     simulation = TASK.open(training=False, reset_scale=0.1)
     with open_runner(threads=1) as runner:
         pairs = [
             Pair(
-                partial(seconds_of, partial(runner.run, [job])),
-                partial(_replay_one, simulation, _record(simulation, job, runner)),
+                partial(seconds_of, partial(runner.run, [brain], [seeds])),
+                partial(_replay_one, simulation, _record(simulation, brain, seeds, runner)),
             )
-            for job in jobs
+            for brain in workload.brains()
         ]
         speed_ratios(pairs, repetitions=1)  # compiles the replay
         ratios = speed_ratios(pairs, repetitions)
     return Row("whole Ant episodes / bare mj_step x 5 + mj_rnePostConstraint, steps/s, 1 thread", RATIO, ratios, BAR)
 
 
-def _record(simulation: Simulation, job: Job, runner: Runner) -> Recording:
-    world, rng, action_rng = simulation.world, generator(job.seeds.world), generator(job.seeds.actions)
-    memory = fresh_memory(job.brain)
-    observation, terms = np.zeros(TASK.observation_size), np.zeros(len(TASK.terms))
+def _record(simulation: Simulation, brain: Brain, seeds: EpisodeSeeds, runner: Runner) -> Recording:
+    world, brains = simulation.world, lay_out([brain])
+    memory, terms = np.zeros(memory_size(brains)), np.zeros(len(TASK.terms))
     action, controls = np.zeros(len(TASK.actuator_names)), []
-    simulation.reset(world, rng)
+    simulation.reset(world, generator(seeds.world))
     status = RUNNING
     while status == RUNNING:
-        simulation.observe(world, observation)
-        activate(job.brain, memory, observation, action, action_rng)
+        simulation.observe(world, memory[: TASK.observation_size])
+        activate(brains, 0, memory, action)
         controls.append(action.copy())
-        status = simulation.step(world, action, rng, terms)
+        status = simulation.step(world, action, terms)
     final_x = _trunk_x(simulation)
-    _check_x("step by step", final_x, float(runner.trace(job).steps[-1, 0]))
-    return Recording(job.seeds, np.array(controls), final_x)
+    _check_x("step by step", final_x, float(runner.trace(brain, seeds).steps[-1, 0]))
+    return Recording(seeds, np.array(controls), final_x)
 
 
 def _replay_one(simulation: Simulation, recording: Recording) -> float:

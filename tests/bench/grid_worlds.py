@@ -16,7 +16,7 @@ from exneat_cli.brains import assemble
 from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.evolution import RECURRENT, neat_config
 from exneat_cli.evolution.subpopulation import Subpopulation
-from exneat_cli.rollouts import Executor, Job, Noise, Outcome, Runner
+from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
 from exneat_cli.tasks import TASKS, GeneralMaze, Hunting, Task
@@ -24,11 +24,13 @@ from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
 from tests.bench.measurement import RATIO, SECONDS, Bar, Pace, Row, VerificationError, pace_ratios, seconds_of
 from tests.bench.plain_python_worlds import PlainHunting, PlainMaze, PlainOutcome, PlainWorld, run_episode
 
-GENOMES = 20
-BLOCK = 10
-"""Genomes that one side runs before it is the other's turn."""
+GENOMES = 200
 EPISODES = 20
-"""Per genome, as in a generation of the paper budget."""
+"""Per genome, both as in a generation of the paper budget."""
+EVERY = 10
+"""One genome in so many is enough for the reference's pace."""
+BLOCK = 10
+"""Genomes that the reference runs before it is our turn again, with all of them."""
 CHECK_EPISODES = 100
 """Per genome, before anything is timed."""
 FOLLOWERS = 5
@@ -52,7 +54,6 @@ class Contest(NamedTuple):
     Attributes:
         task, runner, plan: ours.
         config: neat-python's configuration of the genomes.
-        genomes: a random first generation.
         world: the reference's.
         rng: that all its episodes draw from.
     """
@@ -61,19 +62,13 @@ class Contest(NamedTuple):
     runner: Runner
     plan: Plan
     config: neat.Config
-    genomes: list[neat.DefaultGenome]
     world: PlainWorld
     rng: np.random.Generator
 
-    def run_ours(self, genomes: Sequence[neat.DefaultGenome], seeds: Sequence[Sequence[EpisodeSeeds]]) -> list[Outcome]:
-        """Outcomes genome by genome, networks made here.
-
-        Args:
-            genomes: to be run.
-            seeds: the episodes of each of them.
-        """
+    def run_ours(self, genomes: Sequence[neat.DefaultGenome], seeds: Sequence[EpisodeSeeds]) -> Outcomes:
+        """Outcomes of all genomes in the same episodes, as in training; networks and worlds are made here."""
         brains = [assemble(self.plan, [genome], feed_forward=False) for genome in genomes]
-        return self.runner.run([Job(b, each) for b, episodes in zip(brains, seeds, strict=True) for each in episodes])
+        return self.runner.run(brains, seeds)
 
     def run_reference(self, genomes: Sequence[neat.DefaultGenome], episodes: int) -> list[PlainOutcome]:
         """The same with neat-python's networks in plain Python worlds, a new one for each episode."""
@@ -109,28 +104,33 @@ def _compare(task: Task, world: PlainWorld, repetitions: int) -> Row:
     genomes = list(Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values())
     rng = np.random.default_rng(ROOT_SEED)
     with Runner(task, Noise(), Executor("threads", 1), training=True) as runner:
-        contest = Contest(task, runner, plan, config, genomes, world, rng)
-        _check_same_world(contest, genomes)
+        contest = Contest(task, runner, plan, config, world, rng)
+        some = genomes[::EVERY]
+        _check_same_world(contest, some)
         _check_same_world(contest, [_follower(genomes[0], task)] * FOLLOWERS)
         seeds = training_episodes(ROOT_SEED, 0, EPISODES)
-        blocks = [genomes[first : first + BLOCK] for first in range(0, len(genomes), BLOCK)]
-        pairs = [
-            (
-                partial(_pace_of, partial(contest.run_ours, block, [seeds] * len(block))),
-                partial(_pace_of, partial(contest.run_reference, block, EPISODES)),
-            )
-            for block in blocks
-        ]
-        paces = pace_ratios(pairs, repetitions)
+        ours = partial(_our_pace, contest, genomes, seeds)
+        blocks = [some[first : first + BLOCK] for first in range(0, len(some), BLOCK)]
+        paces = pace_ratios([(ours, partial(_reference_pace, contest, block)) for block in blocks], repetitions)
     note = f"{SPEED_AIM}; last repetition: {paces.ours.rate:,.0f} against {paces.reference.rate:,.0f} steps/s"
-    name = f"exneat / plain Python and NumPy, {task.name}, NEAT {'-'.join(map(str, shape))}, steps/s, 1 thread"
+    network = f"NEAT {'-'.join(map(str, shape))}"
+    name = f"exneat, {GENOMES} genomes at once / plain Python and NumPy, {task.name}, {network}, steps/s, 1 thread"
     return Row(name, RATIO, paces.ratios, SPEED_BAR, note)
 
 
-def _pace_of(run: Callable[[], Sequence[Outcome] | Sequence[PlainOutcome]]) -> Pace:
-    outcomes: list[Outcome | PlainOutcome] = []
-    seconds = seconds_of(lambda: outcomes.extend(run()))
-    return Pace(sum(outcome.steps for outcome in outcomes), seconds)
+def _our_pace(contest: Contest, genomes: Sequence[neat.DefaultGenome], seeds: Sequence[EpisodeSeeds]) -> Pace:
+    return _pace_of(lambda: int(contest.run_ours(genomes, seeds).steps.sum()))
+
+
+def _reference_pace(contest: Contest, genomes: Sequence[neat.DefaultGenome]) -> Pace:
+    return _pace_of(lambda: sum(outcome.steps for outcome in contest.run_reference(genomes, EPISODES)))
+
+
+def _pace_of(run: Callable[[], int]) -> Pace:
+    """The pace of `run`, which returns how many steps it did."""
+    steps: list[int] = []
+    seconds = seconds_of(lambda: steps.append(run()))
+    return Pace(sum(steps), seconds)
 
 
 def _follower(genome: neat.DefaultGenome, task: Task) -> neat.DefaultGenome:
@@ -146,13 +146,14 @@ def _check_same_world(contest: Contest, genomes: Sequence[neat.DefaultGenome]) -
     """Compare both sides' mean fitness and steps, every episode in a world of its own."""
     name = contest.task.name
     seeds = [training_episodes(ROOT_SEED, 1 + k, CHECK_EPISODES) for k in range(len(genomes))]
-    ours, reference = contest.run_ours(genomes, seeds), contest.run_reference(genomes, CHECK_EPISODES)
-    if any(outcome.failed for outcome in ours):
+    ours = [contest.run_ours([genome], own) for genome, own in zip(genomes, seeds, strict=True)]
+    reference = contest.run_reference(genomes, CHECK_EPISODES)
+    if any(outcomes.failed.any() for outcomes in ours):
         raise VerificationError(f"{name}: a network exploded, so there is nothing to compare")
     for what in ("fitness", "steps"):
         sides = [
-            np.reshape([getattr(outcome, what) for outcome in side], (len(genomes), CHECK_EPISODES))
-            for side in (ours, reference)
+            np.concatenate([getattr(outcomes, what) for outcomes in ours]),
+            np.reshape([getattr(outcome, what) for outcome in reference], (len(genomes), CHECK_EPISODES)),
         ]
         variance = sum(side.var(axis=1, ddof=1).mean() / side.size for side in sides)
         our_mean, reference_mean = (side.mean() for side in sides)

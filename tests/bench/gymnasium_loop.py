@@ -9,10 +9,10 @@ import gymnasium
 import neat
 import numpy as np
 
-from exneat_cli.rollouts import Outcome, Runner
+from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.seeding import generator
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
-from tests.bench.workload import Episode, Workload, open_runner
+from tests.bench.workload import Workload, open_runner
 
 BAR = Bar(1.5, at_least=True)
 TOLERANCE = 1e-6
@@ -32,23 +32,24 @@ def compare_with_gymnasium(workload: Workload, repetitions: int) -> Row:
         _check_rewards(workload, runner, env)
         pairs = [
             Pair(
-                partial(seconds_of, partial(_run_ours, runner, workload._replace(episodes=[episode]))),
-                partial(seconds_of, partial(_forward_reward, env, episode, workload.config)),
+                partial(seconds_of, partial(_run_ours, runner, single)),
+                partial(seconds_of, partial(_forward_reward, env, single)),
             )
-            for episode in workload.episodes
+            for single in workload.one_by_one()
         ]
         ratios = speed_ratios(pairs, repetitions)
     env.close()
     return Row("exneat / neat-python on Gymnasium's Ant-v5, NEAT 105-6-8, steps/s, 1 thread", RATIO, ratios, BAR)
 
 
-def _run_ours(runner: Runner, workload: Workload) -> list[Outcome]:
-    return runner.run(workload.jobs())
+def _run_ours(runner: Runner, workload: Workload) -> Outcomes:
+    return runner.run(workload.brains(), [workload.seeds])
 
 
-def _forward_reward(env: gymnasium.Env[Any, Any], episode: Episode, config: neat.Config) -> float:
-    network = neat.nn.FeedForwardNetwork.create(episode.genome, config)
-    env.unwrapped.np_random = generator(episode.seeds.world)
+def _forward_reward(env: gymnasium.Env[Any, Any], single: Workload) -> float:
+    (genome,) = single.genomes
+    network = neat.nn.FeedForwardNetwork.create(genome, single.config)
+    env.unwrapped.np_random = generator(single.seeds.world)
     observation, _ = env.reset()
     total, over = 0.0, False
     while not over:
@@ -59,9 +60,9 @@ def _forward_reward(env: gymnasium.Env[Any, Any], episode: Episode, config: neat
 
 
 def _check_rewards(workload: Workload, runner: Runner, env: gymnasium.Env[Any, Any]) -> None:
-    for episode, outcome in zip(workload.episodes, _run_ours(runner, workload), strict=True):
-        expected = _forward_reward(env, episode, workload.config)
-        if not abs(outcome.fitness - expected) <= TOLERANCE * abs(expected):
-            raise VerificationError(
-                f"forward reward of genome {episode.genome.key}: {outcome.fitness!r}; Gymnasium gives {expected!r}"
-            )
+    fitness = _run_ours(runner, workload).fitness[:, 0].tolist()
+    for single, ours in zip(workload.one_by_one(), fitness, strict=True):
+        expected = _forward_reward(env, single)
+        if not abs(ours - expected) <= TOLERANCE * abs(expected):
+            key = single.genomes[0].key
+            raise VerificationError(f"forward reward of genome {key}: {ours!r}; Gymnasium gives {expected!r}")

@@ -7,6 +7,8 @@ import time
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from exneat_cli.rollouts import Executor
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import Workload, open_runner
@@ -25,23 +27,23 @@ def usable_cores() -> int:
 
 
 def compare_threads(workload: Workload, repetitions: int) -> Row:
-    """Environment steps per second on two threads over those on one, same jobs.
+    """Environment steps per second on two threads over those on one, same brains.
 
     Raises:
         VerificationError: the outcomes differ.
     """
-    jobs = workload.jobs()
+    work = workload.brains(), [workload.seeds]
     with open_runner(threads=2) as two, open_runner(threads=1) as one:
-        if two.run(jobs) != one.run(jobs):
+        if not all(np.array_equal(*sides) for sides in zip(two.run(*work), one.run(*work), strict=True)):
             raise VerificationError("the outcomes of episodes depend on the number of threads")
-        pair = Pair(partial(seconds_of, partial(two.run, jobs)), partial(seconds_of, partial(one.run, jobs)))
+        pair = Pair(partial(seconds_of, partial(two.run, *work)), partial(seconds_of, partial(one.run, *work)))
         began, others_before = time.perf_counter(), _core_seconds_of_others()
         ratios = speed_ratios([pair], repetitions)
         seconds, others_after = time.perf_counter() - began, _core_seconds_of_others()
     note = f"{usable_cores()} cores seen"
     if others_before is not None and others_after is not None:
         note += f", {max(0.0, others_after - others_before) / seconds:.2f} cores busy with other processes"
-    name = f"2 threads / 1 thread, {len(jobs)} whole Ant episodes, steps/s"
+    name = f"2 threads / 1 thread, {len(workload.genomes)} whole Ant episodes, steps/s"
     return Row(name, RATIO, ratios, BAR, note)
 
 

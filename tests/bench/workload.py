@@ -1,22 +1,23 @@
-"""What all comparisons run: random NEAT networks on Ant, in episodes of full length."""
+"""What all comparisons run: random NEAT networks on Ant, in one episode of full length for all of them."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import neat
+import numpy as np
 
-from exneat_cli.brains import assemble
+from exneat_cli.brains import Brain, assemble
 from exneat_cli.evolution import EvolutionSettings, neat_config
 from exneat_cli.evolution.subpopulation import Subpopulation
-from exneat_cli.rollouts import Executor, Job, Noise, Runner
+from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry, Wiring, plan_wiring
 from tests.bench.measurement import VerificationError
 
 CANDIDATES = 100
-"""Genomes of the random first generation that episodes are drawn from."""
+"""Genomes of the random first generation that the workload is chosen from."""
 ROOT_SEED = 0
 
 TASK = AntTask(max_steps=1000)
@@ -24,33 +25,30 @@ SETTINGS = EvolutionSettings()
 PLAN = plan_wiring(TASK, "neat", Geometry(), "none", Wiring(), hidden=SETTINGS.neat_hidden)
 
 
-class Episode(NamedTuple):
-    """One genome in one episode."""
-
-    genome: neat.DefaultGenome
-    seeds: EpisodeSeeds
-
-
 class Workload(NamedTuple):
-    """Episodes that all last `TASK.max_steps` control steps.
+    """Genomes whose episode lasts `TASK.max_steps` control steps.
 
     Attributes:
         config: neat-python's configuration of the genomes.
-        episodes: each with a genome and a world of its own.
+        genomes: that all face the same episode, as in training.
+        seeds: of that episode.
     """
 
     config: neat.Config
-    episodes: list[Episode]
+    genomes: list[neat.DefaultGenome]
+    seeds: EpisodeSeeds
 
     def first(self, count: int) -> Workload:
-        """The same with only the first `count` episodes."""
-        return self._replace(episodes=self.episodes[:count])
+        """The same with only the first `count` genomes."""
+        return self._replace(genomes=self.genomes[:count])
 
-    def jobs(self) -> list[Job]:
-        """The episodes with their genomes compiled."""
-        return [
-            Job(assemble(PLAN, [genome], feed_forward=SETTINGS.feed_forward), seeds) for genome, seeds in self.episodes
-        ]
+    def one_by_one(self) -> list[Workload]:
+        """The same, a genome each."""
+        return [self._replace(genomes=[genome]) for genome in self.genomes]
+
+    def brains(self) -> list[Brain]:
+        """The genomes compiled."""
+        return [assemble(PLAN, [genome], feed_forward=SETTINGS.feed_forward) for genome in self.genomes]
 
 
 def open_runner(threads: int) -> Runner:
@@ -59,23 +57,21 @@ def open_runner(threads: int) -> Runner:
 
 
 def find_workload(count: int) -> Workload:
-    """The first `count` untrained genomes that do not fall, each in a world of its own.
+    """The first `count` untrained genomes that do not fall.
 
     Raises:
         VerificationError: too few of the random genomes keep upright, or nothing is compiled here.
     """
     (shape,) = PLAN.subpopulation_shapes
     config = neat_config(SETTINGS, CANDIDATES, shape)
-    genomes = Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values()
-    candidates = [Episode(*pair) for pair in zip(genomes, shared_episodes("test", CANDIDATES), strict=True)]
-    upright: list[Episode] = []
+    genomes = list(Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values())
+    (seeds,) = shared_episodes("test", 1)
+    candidates = Workload(config, genomes, seeds)
     with open_runner(threads=1) as runner:
         if not runner.compiled:
             raise VerificationError("compiled code cannot call MuJoCo here, so there is nothing to measure")
-        for candidate in candidates:
-            (outcome,) = runner.run(Workload(config, [candidate]).jobs())
-            if outcome.steps == TASK.max_steps and not outcome.failed:
-                upright.append(candidate)
-            if len(upright) == count:
-                return Workload(config, upright)
-    raise VerificationError(f"expected {count} of {CANDIDATES} random genomes to keep upright, got {len(upright)}")
+        outcomes = runner.run(candidates.brains(), [seeds])
+    upright = np.flatnonzero((outcomes.steps[:, 0] == TASK.max_steps) & ~outcomes.failed[:, 0])
+    if len(upright) < count:
+        raise VerificationError(f"expected {count} of {CANDIDATES} random genomes to keep upright, got {len(upright)}")
+    return candidates._replace(genomes=[genomes[k] for k in upright[:count]])

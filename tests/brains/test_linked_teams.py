@@ -10,8 +10,8 @@ import neat
 import numpy as np
 import pytest
 
-from exneat_cli.brains import assemble, motionless
-from exneat_cli.brains.brain import activate, fresh_memory
+from exneat_cli.brains import Brain, assemble, linear_fusion, motionless
+from exneat_cli.brains.brain import Brains, activate, lay_out, memory_size
 from exneat_cli.evolution import EvolutionSettings, neat_config
 from exneat_cli.tasks import AntTask, Sector
 from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_wiring
@@ -106,19 +106,27 @@ def random_team(plan: Plan, settings: EvolutionSettings, seed: int) -> list[neat
 
 
 def assert_equal_to_reference(plan: Plan, genomes: list[neat.DefaultGenome], feed_forward: bool, seed: int) -> None:
-    brain = assemble(plan, genomes, feed_forward=feed_forward)
+    brains = lay_out([assemble(plan, genomes, feed_forward=feed_forward)])
     slow = SlowTeam(plan, genomes, feed_forward)
-    memory, action = fresh_memory(brain), np.zeros(plan.action_size)
-    rng = np.random.default_rng(seed)
-    for _ in range(STEPS):
-        observation = rng.normal(size=plan.observation_size)
-        activate(brain, memory, observation, action, rng)
+    observations = np.random.default_rng(seed).normal(size=(STEPS, plan.observation_size))
+    actions = actions_of(brains, 0, observations)
+    for action, observation in zip(actions, observations, strict=True):
         np.testing.assert_allclose(action, slow.step(observation), rtol=1e-12, atol=0.0)
+
+
+def actions_of(brains: Brains, b: int, observations: np.ndarray) -> np.ndarray:
+    """(steps, A) what brain `b` does from its start on, given (steps, observation size)."""
+    memory = np.zeros(memory_size(brains))
+    actions = np.full((len(observations), brains.output_slot.shape[1]), np.nan)
+    for observation, action in zip(observations, actions, strict=True):
+        memory[: observation.size] = observation
+        activate(brains, b, memory, action)
+    return actions
 
 
 def busy(settings: EvolutionSettings, **changes: object) -> EvolutionSettings:
     rates = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.5)
-    return EvolutionSettings(**{**vars(settings), **rates, **changes})  # type: ignore[arg-type]
+    return EvolutionSettings(**{**vars(settings), **rates, **changes})
 
 
 @pytest.mark.parametrize("central", [True, False])
@@ -166,7 +174,38 @@ def test_hidden_nodes_that_were_deleted_are_read_as_zero(ant_settings: Evolution
 
 
 def test_the_motionless_brain_holds_every_actuator_at_zero() -> None:
-    brain = motionless(105, np.zeros(8))
-    action = np.ones(8)
-    activate(brain, fresh_memory(brain), np.full(105, 7.0), action, np.random.default_rng(0))
-    assert not action.any()
+    actions = actions_of(lay_out([motionless(105, np.zeros(8))]), 0, np.full((3, 105), 7.0))
+    assert not actions.any()
+
+
+def brains_of_many_sizes(settings: EvolutionSettings) -> list[Brain]:
+    """Feed-forward and recurrent teams, linked and not, and rules, all for the same body."""
+    brains = [motionless(8, np.arange(4.0)), linear_fusion(8, 4, Cross.sectors)]
+    for feed_forward in (True, False):
+        for seed, (geometry, linkage) in enumerate([("single", "hidden"), ("all", "none"), ("all", "output")]):
+            plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
+            brains.append(assemble(plan, random_team(plan, settings, seed), feed_forward=feed_forward))
+    return brains
+
+
+def test_a_brain_among_many_of_other_sizes_does_exactly_what_it_does_alone(grid_settings: EvolutionSettings) -> None:
+    settings = busy(grid_settings, activation="tanh", bias_sd=0.5, weight_sd=0.5)
+    brains = brains_of_many_sizes(settings)
+    assert len({brain.size for brain in brains}) > 4
+    assert {brain.recurrent for brain in brains} == {True, False}
+    observations = np.random.default_rng(2).normal(size=(STEPS, 8))
+    for order in (brains, brains[::-1]):
+        together = lay_out(order)
+        for b, brain in enumerate(order):
+            alone = actions_of(lay_out([brain]), 0, observations)
+            np.testing.assert_array_equal(actions_of(together, b, observations), alone)
+
+
+def test_a_brain_writes_to_no_more_memory_than_is_asked_for(grid_settings: EvolutionSettings) -> None:
+    brains = lay_out(brains_of_many_sizes(busy(grid_settings)))
+    size = memory_size(brains)
+    for b in range(len(brains.size)):
+        memory, action = np.zeros(size + 10), np.zeros(4)
+        memory[size:] = 7.0
+        activate(brains, b, memory, action)
+        assert (memory[size:] == 7.0).all()

@@ -12,7 +12,7 @@ import pytest
 from neat.genes import DefaultConnectionGene, DefaultNodeGene
 
 from exneat_cli.brains import assemble
-from exneat_cli.brains.brain import activate, fresh_memory
+from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import EvolutionSettings, neat_config
 from exneat_cli.wiring import Module, Pin, Plan
@@ -54,17 +54,17 @@ def random_genome(seed: int, config: neat.Config, mutations: int) -> neat.Defaul
 
 def wild(settings: EvolutionSettings) -> EvolutionSettings:
     rates = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.6)
-    return EvolutionSettings(**{**vars(settings), **rates, "weight_sd": 1.0, "bias_sd": 1.0})
+    return EvolutionSettings(**{**vars(settings), **rates, "weight_sd": 1.0, "bias_sd": 1.0})  # type: ignore[arg-type]
 
 
 def assert_equal_outputs(genome: neat.DefaultGenome, config: neat.Config, network: object, recurrent: bool) -> None:
-    brain = assemble(single_module_plan(), [genome], feed_forward=not recurrent)
-    memory, action = fresh_memory(brain), np.zeros(OUTPUTS)
+    brains = lay_out([assemble(single_module_plan(), [genome], feed_forward=not recurrent)])
+    memory, action = np.zeros(memory_size(brains)), np.zeros(OUTPUTS)
     rng = np.random.default_rng(genome.key)
     for _ in range(STEPS):
-        observation = rng.normal(size=INPUTS)
-        expected = network.activate(observation)  # type: ignore[attr-defined]
-        activate(brain, memory, observation, action, rng)
+        memory[:INPUTS] = rng.normal(size=INPUTS)
+        expected = network.activate(memory[:INPUTS].copy())  # type: ignore[attr-defined]
+        activate(brains, 0, memory, action)
         np.testing.assert_allclose(action, expected, rtol=1e-12, atol=0.0)
 
 

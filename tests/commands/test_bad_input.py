@@ -83,6 +83,16 @@ CASES = [
     (["task=foraging", "task.n_prey=100"], "task.n_prey: expected a whole number from 1 to 99, got 100"),
     (["task=foraging", "task.n_prey=0"], "task.n_prey: expected"),
     (["task=foraging", "task.steps=0"], "task.steps: expected"),
+    (["task=foraging", "task.steps=23302"], "task.steps: expected at most 23301 for this size and n_prey, got 23302"),
+    (["task=foraging", "task.size=99", "task.n_prey=100"], "task.steps: expected at most 32 for this size and n_prey"),
+    (
+        ["task=hunting", "task.steps=1000000"],
+        "task.steps: expected at most 11650 for this size and n_prey, got 1000000",
+    ),
+    (
+        ["task=hunting", "task.size=99", "task.n_prey=9800"],
+        "task.n_prey: expected at most 1644 for this size, got 9800",
+    ),
     (["task=foraging", "task.p_e=1.5"], "task.p_e: expected"),
     (["task=foraging", "task.p_c=nan"], "task.p_c: expected"),
     (["task=foraging", "task.p_m=0.5"], "task.p_m: unknown key"),

@@ -48,7 +48,7 @@ def test_one_subpopulation_evolves_exactly_like_neat_population(ant_settings: Ev
 
     def fitness_of(genome: neat.DefaultGenome, config: neat.Config) -> float:
         network = neat.nn.FeedForwardNetwork.create(genome, config)
-        return 4.0 - sum((network.activate(inputs)[0] - target) ** 2 for inputs, target in XOR)
+        return float(4.0 - sum((network.activate(inputs)[0] - target) ** 2 for inputs, target in XOR))
 
     def evaluate(genomes: list[tuple[int, neat.DefaultGenome]], config: neat.Config) -> None:
         theirs.append([fingerprint(genome) for _, genome in genomes])

@@ -46,7 +46,7 @@ def test_the_bytes_do_not_depend_on_the_order_of_the_rows(
 def test_a_damaged_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robustness.csv"
     path.write_text(text)
-    with pytest.raises(ExneatError, match="robustness.csv: expected a table"):
+    with pytest.raises(ExneatError, match=r"robustness\.csv: expected a table"):
         read_robustness(path)
 
 

@@ -46,7 +46,7 @@ def test_a_setting_that_the_task_lacks_is_refused_by_name(parameter: str) -> Non
 def test_a_level_out_of_range_is_refused_before_the_first_level_runs() -> None:
     task = TrackMaze()
     sweep = Sweep("gap", "task.gap", (0, 99))
-    with pytest.raises(ConfigError, match="task.gap"):
+    with pytest.raises(ConfigError, match=r"task\.gap"):
         next(run_levels([linear_fusion(8, 5, task.sectors)], task, Noise(), sweep, Executor("serial"), []))
 
 

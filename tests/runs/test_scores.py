@@ -7,17 +7,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exneat_cli.rollouts import Outcome
-from exneat_cli.runs.scores import score, summary_sentence
+from exneat_cli.rollouts import Outcomes
+from exneat_cli.runs.scores import baseline_episodes, score_all, summary_sentence
+from exneat_cli.seeding import generator, shared_episodes
 from exneat_cli.tasks import AntTask
 
 
 def test_a_score_counts_failures_with_their_floor() -> None:
-    outcomes = [Outcome(10.0, 20.0, 5, False), Outcome(-100.0, -100.0, 2, True)]
-    tested = score(outcomes)
-    assert (tested.episodes, tested.failed_episodes) == (2, 1)
+    outcomes = Outcomes(
+        fitness=np.array([[1.0, 3.0], [10.0, -100.0]]),
+        full_reward=np.array([[2.0, 4.0], [20.0, -100.0]]),
+        steps=np.array([[5, 5], [5, 2]]),
+        failed=np.array([[False, False], [False, True]]),
+    )
+    sound, tested = score_all(outcomes)
+    assert (sound.episodes, sound.failed_episodes, sound.fitness) == (2, 0, (1.0, 3.0))
+    assert (tested.episodes, tested.failed_episodes, tested.fitness) == (2, 1, (10.0, -100.0))
     assert (tested.fitness_mean, tested.fitness_std) == (-45.0, 55.0)
     assert (tested.full_reward_mean, tested.full_reward_std) == (-40.0, 60.0)
+
+
+def test_a_baseline_faces_the_test_episodes_with_chance_of_the_runs_own() -> None:
+    def draws(root: int) -> list[list[float]]:
+        return [[generator(seed).random() for seed in seeds] for seeds in baseline_episodes(root, 3)]
+
+    tests = [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
+    zero, one = np.array(draws(0)), np.array(draws(1))
+    np.testing.assert_array_equal(zero[:, :2], np.array(tests)[:, :2])
+    np.testing.assert_array_equal(one[:, :2], zero[:, :2])
+    assert len(np.unique([zero[:, 2], one[:, 2]])) == 6
 
 
 def figures(*fitness: float, failed: int = 0) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from exneat_cli.brains import Brain
+from exneat_cli.brains import Brain, assemble
 from exneat_cli.brains.brain import ACTIVATION_CODES
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import HistoryRow, RunDirectory, read_champion
@@ -201,7 +201,6 @@ def exploding(brain: Brain) -> Brain:
 
 
 def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assemble = training_module.assemble
     calls = itertools.count()
 
     def every_other_explodes(*arguments: Any, **options: Any) -> Brain:
@@ -238,7 +237,6 @@ def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) 
 def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assemble = training_module.assemble
     monkeypatch.setattr(training_module, "assemble", lambda *a, **o: exploding(assemble(*a, **o)))
     with pytest.raises(ExneatError, match="no team ever finished"):
         train(tiny(tmp_path))

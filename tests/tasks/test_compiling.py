@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
-from exneat_cli.tasks.compiling import cache_directory, compiled, with_functions
+from exneat_cli.tasks.compiling import cache_directory, compiled, compiled_lean, with_functions
 
 
 def double(x: float) -> float:
@@ -31,6 +33,27 @@ def test_copies_of_a_template_call_the_functions_they_were_given() -> None:
     assert with_functions(template, "plain", inner=double)(3.0) == 7.0
 
 
+def halve_all(values: np.ndarray) -> float:
+    total = 0.0
+    for i in range(values.size):
+        values[i] /= 2.0
+        total += values[i]
+    return total
+
+
+def test_lean_code_does_what_it_does_elsewhere_and_may_be_called_from_anywhere() -> None:
+    plain, lean, inside = (np.arange(4.0) for _ in range(3))
+    halve = compiled_lean(halve_all)
+    assert halve_all(plain) == halve(lean) == compiled(with_functions(template, "halving", inner=halve))(inside) - 1.0
+    np.testing.assert_array_equal(lean, plain)
+    np.testing.assert_array_equal(inside, plain)
+
+
+def test_lean_code_that_allocates_is_refused_by_the_compiler() -> None:
+    with pytest.raises(numba.errors.NumbaError):
+        compiled_lean(lambda size: np.zeros(size))(3)
+
+
 def in_new_process(code: str, cache: Path) -> str:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
@@ -40,10 +63,11 @@ def in_new_process(code: str, cache: Path) -> str:
 def test_a_second_process_finds_compiled_code_in_the_cache(tmp_path: Path) -> None:
     code = (
         "import numpy as np\n"
-        "from exneat_cli.brains.brain import fresh_memory\n"
+        "from exneat_cli.brains.brain import activate, lay_out, memory_size\n"
         "from exneat_cli.brains import motionless\n"
-        "fresh_memory(motionless(3, np.zeros(2)))\n"
-        "print(sum(fresh_memory.stats.cache_hits.values()), sum(fresh_memory.stats.cache_misses.values()))"
+        "brains = lay_out([motionless(3, np.zeros(2))])\n"
+        "activate(brains, 0, np.zeros(memory_size(brains)), np.zeros(2))\n"
+        "print(sum(activate.stats.cache_hits.values()), sum(activate.stats.cache_misses.values()))"
     )
     assert in_new_process(code, tmp_path) == "0 1"
     assert in_new_process(code, tmp_path) == "1 0"

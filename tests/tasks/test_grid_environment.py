@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from exneat_cli.brains import RandomActions
+from exneat_cli.brains import Brain, RandomActions, linear_fusion
 from exneat_cli.errors import ConfigError
-from exneat_cli.rollouts import Executor, Job, Noise, Runner
+from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import generator, training_episodes
 from exneat_cli.tasks.grid_environment import WORLDS
 
@@ -29,32 +29,35 @@ def test_the_checker_of_gymnasium_has_nothing_to_say(world: str) -> None:
     check_env(gymnasium.make(world, **PARAMETERS[world]).unwrapped, skip_render_check=True)
 
 
+@pytest.mark.parametrize("at_random", [True, False])
 @pytest.mark.parametrize("world", WORLDS)
-def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world: str) -> None:
+def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world: str, at_random: bool) -> None:
     parameters = PARAMETERS[world]
     env = gymnasium.make(world, **parameters)
     task = WORLDS[world](**parameters)
-    brain, located = RandomActions(*task.action_bounds), len(task.trace_columns)
+    acting = RandomActions(*task.action_bounds) if at_random else linear_fusion(8, 5, task.sectors)
+    located = len(task.trace_columns)
     place = np.zeros(located)
     with Runner(task, Noise(), Executor("serial"), training=False) as runner:
         for seeds in training_episodes(11, 0, 200):
-            job = Job(brain, seeds)
-            (outcome,), trace = runner.run([job]), runner.trace(job).steps
-            # The same episode again: five random values, then five draws that break ties, for each move.
+            outcomes = runner.run([acting] if isinstance(acting, Brain) else acting, [seeds])
+            trace = runner.trace(acting, seeds).steps
+            # The same episode again: for each move five draws, which choose alone or break ties.
             choices = generator(seeds.actions)
             env.unwrapped.np_random = generator(seeds.world)
-            env.reset()
+            observation, _ = env.reset()
             rewards, over = [], False
             while not over:
-                action = int(np.argmax(choices.uniform(0.0, 1.0, 5) + choices.uniform(0.0, task.tie_noise, 5)))
-                _, reward, over, truncated, info = env.step(action)
+                fused = np.append(observation.reshape(4, 2).sum(axis=1), 0.0)
+                values = choices.uniform(0.0, 1.0, 5) if at_random else fused + choices.uniform(0.0, task.tie_noise, 5)
+                observation, reward, over, truncated, info = env.step(int(np.argmax(values)))
                 rewards.append(float(reward))
                 assert not truncated
                 env.unwrapped._simulation.locate(env.unwrapped._simulation.world, place)  # type: ignore[attr-defined]
                 np.testing.assert_array_equal(place, trace[len(rewards), :located])
                 np.testing.assert_array_equal(list(info.values()), trace[len(rewards), located:])
-            assert len(rewards) == outcome.steps
-            assert sum(rewards) == outcome.fitness
+            assert len(rewards) == outcomes.steps[0, 0]
+            assert sum(rewards) == outcomes.fitness[0, 0]
             assert not any(rewards[:-1])
 
 
@@ -70,11 +73,13 @@ def test_an_action_that_does_not_exist_is_refused(action: float) -> None:
 def test_observations_are_clipped_neighbours(world: str) -> None:
     env = gymnasium.make(world, **PARAMETERS[world])
     observation, _ = env.reset(seed=1)
-    grid = env.unwrapped._simulation.world.grid  # type: ignore[attr-defined]
-    row, column = grid.agent[:2]
+    world_now = env.unwrapped._simulation.world  # type: ignore[attr-defined]
+    tiles = env.unwrapped.task.tiles(world_now)  # type: ignore[attr-defined]
+    row, column = world_now.grid.agent[:2]
     neighbours = [(row, column - 1), (row, column + 1), (row - 1, column), (row + 1, column)]
-    expected = [grid.signals[channel, r, c] for r, c in neighbours for channel in (0, 1)]
-    np.testing.assert_array_equal(observation, np.clip(expected, 0.0, 1.0))
+    expected = [tiles[r, c, 1 + channel] for r, c in neighbours for channel in (0, 1)]
+    np.testing.assert_allclose(observation, np.clip(expected, 0.0, 1.0), rtol=0, atol=1e-12)
+    assert observation.any()
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -107,6 +112,8 @@ def test_pictures_and_text_show_the_agent_and_what_it_seeks(world: str) -> None:
         ("exneat/Foraging-v0", {"p_c": 2}, "task.p_c"),
         ("exneat/Foraging-v0", {"steps": 0}, "task.steps"),
         ("exneat/Foraging-v0", {"patch_width": 4}, "task.patch_width"),
+        ("exneat/Foraging-v0", {"steps": 23_302}, "task.steps"),
+        ("exneat/Hunting-v0", {"size": 99, "n_prey": 9800}, "task.n_prey"),
         ("exneat/Hunting-v0", {"p_m": float("nan")}, "task.p_m"),
         ("exneat/Hunting-v0", {"motion": "random"}, "task.motion"),
     ],

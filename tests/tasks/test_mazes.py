@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.stats import chisquare
 
 from exneat_cli.brains import RandomActions, linear_fusion
-from exneat_cli.rollouts import Executor, Job, Noise, Runner
+from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import shared_episodes
 from exneat_cli.tasks import ENDED, RUNNING, GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid import COLUMN, MOVES, ROW, STAY
@@ -99,7 +99,8 @@ def test_distances_equal_scipys(size: int, seed: int, walls_removed: float) -> N
 
 def test_start_and_goal_are_two_different_corners_and_all_pairs_occur() -> None:
     maze: Maze = GeneralMaze().open(training=False, reset_scale=0.0).world
-    rng, pairs = np.random.default_rng(0), Counter()
+    rng = np.random.default_rng(0)
+    pairs: Counter[tuple[tuple[int, ...], tuple[int, ...]]] = Counter()
     for _ in range(2400):
         reset_general(maze, rng)
         pairs[tuple(maze.grid.agent[:2]), tuple(maze.goal[:2])] += 1
@@ -178,13 +179,14 @@ def test_cue_noise_lies_on_path_tiles_alone_and_never_below_zero() -> None:
 
 
 def values(move: str) -> np.ndarray:
-    return np.eye(len(MOVES))[MOVES.index(move)]
+    values: np.ndarray = np.eye(len(MOVES))[MOVES.index(move)]
+    return values
 
 
 def walk(maze: Maze, moves: list[str]) -> tuple[float, int]:
-    rng, terms, total = np.random.default_rng(0), np.zeros(2), 0.0
+    terms, total = np.zeros(2), 0.0
     for count, move in enumerate(moves, start=1):
-        status = step(maze, values(move), rng, terms)
+        status = step(maze, values(move), terms)
         total += terms.sum()
         if status == ENDED:
             return total, count
@@ -201,7 +203,9 @@ def test_wasted_steps_cost_a_quarter_each_and_the_last_allowed_step_still_gives_
 ) -> None:
     maze = track(1)
     ahead = "right" if maze.goal[GOAL_COLUMN] > 6 else "left"
-    assert walk(maze, wasted + [ahead] * 5) == (pytest.approx(expected), 5 + len(wasted))
+    fitness, steps = walk(maze, wasted + [ahead] * 5)
+    assert fitness == pytest.approx(expected)
+    assert steps == 5 + len(wasted)
 
 
 def test_never_moving_gives_a_quarter_on_a_track_and_the_wrong_end_nothing() -> None:
@@ -222,7 +226,7 @@ def test_time_alone_leaves_progress_out() -> None:
 
 def test_a_step_into_a_wall_stays() -> None:
     maze, row = track(1), np.zeros(4)
-    step(maze, values("up"), np.random.default_rng(0), np.zeros(2))
+    step(maze, values("up"), np.zeros(2))
     locate(maze, row)
     assert list(row) == [6, 6, *maze.goal[:2]]
     assert (maze.grid.agent[ROW], maze.grid.agent[COLUMN]) == (6, 6)
@@ -236,11 +240,11 @@ def test_linear_fusion_solves_every_noiseless_maze_perfectly_and_chance_is_far_b
     task: TrackMaze | GeneralMaze,
 ) -> None:
     fusion, chance = linear_fusion(8, 5, task.sectors), RandomActions(*task.action_bounds)
+    episodes = shared_episodes("test", 100)
     with Runner(task, Noise(), Executor(), training=False) as runner:
-        outcomes = runner.run([Job(fusion, seeds) for seeds in shared_episodes("test", 100)])
-        luck = runner.run([Job(chance, seeds) for seeds in shared_episodes("test", 100)])
-    assert [outcome.fitness for outcome in outcomes] == [1.0] * 100
-    assert np.mean([outcome.fitness for outcome in luck]) < (0.5 if task.size == 5 else 0.35)
+        outcomes, luck = runner.run([fusion], episodes), runner.run(chance, episodes)
+    assert outcomes.fitness.tolist() == [[1.0] * 100]
+    assert luck.fitness.mean() < (0.5 if task.size == 5 else 0.35)
 
 
 @given(ODD, st.integers(0, 2**32))
@@ -249,3 +253,4 @@ def test_the_budget_is_the_fastest_way_and_two_steps(size: int, seed: int) -> No
     maze = general(seed, size=size)
     _, steps = walk(maze, ["stay"] * (size * size + 5))
     assert steps == maze.goal[FASTEST] + 2
+    assert steps <= GeneralMaze(size=size).longest_episode
