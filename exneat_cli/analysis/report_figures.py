@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exneat_cli.analysis.artefacts import Built
+from exneat_cli.analysis.budgets import budget_sentence, spent_in
+from exneat_cli.analysis.captions import few_runs_sentence
 from exneat_cli.analysis.catalogue import FigurePlan, Panel
 from exneat_cli.analysis.figures import new_figure, save_figure, style
 from exneat_cli.analysis.network_figures import draw_champions
@@ -20,8 +22,6 @@ from exneat_cli.errors import ExneatError, check_choice
 
 AXES = tuple(AXIS_LABELS)
 """What the horizontal axis of a training curve can be."""
-ENOUGH_RUNS = 10
-"""Below these, a bootstrap over runs gives intervals that are too narrow."""
 _TRAINING: dict[str, Callable[[Axes, Panel, Study, str], dict[str, int]]] = {
     "training": draw_means,
     "training_runs": draw_each_run,
@@ -121,15 +121,19 @@ def _add_legend(figure: Figure, width: float) -> None:
 
 
 def _sentences(plan: FigurePlan, studies: Mapping[str, Study], counts: list[dict[str, int]], axis: str) -> list[str]:
-    panels, trained = [], []
+    panels, trained, spent = [], [], []
     for number, (panel, runs) in enumerate(zip(plan.panels, counts, strict=True), start=1):
         study = studies[panel.experiment]
         place = f"Panel {number}, " if len(plan.panels) > 1 else ""
         listed = "; ".join(f"{study.arms[arm]} {count}" for arm, count in runs.items())
         panels.append(f"{place}{study.conditions[panel.condition]}, number of runs: {listed}.")
-        trained += [count for arm, count in runs.items() if arm in study.trained_arms]
+        learning = [arm for arm in runs if arm in study.trained_arms]
+        trained += [runs[arm] for arm in learning]
+        spent.append(spent_in(study, panel.condition, learning))
     panels[0] = panels[0][0].upper() + panels[0][1:]
-    return [*panels, _budgets(plan, studies), _WHAT_IS_SHOWN[plan.kind], *_particulars(plan.kind, axis, trained)]
+    particulars = _particulars(plan.kind, axis, trained)
+    sentences = [*panels, _WHAT_IS_SHOWN[plan.kind], *particulars, _budgets(plan, studies), budget_sentence(spent)]
+    return [sentence for sentence in sentences if sentence]
 
 
 def _budgets(plan: FigurePlan, studies: Mapping[str, Study]) -> str:
@@ -145,6 +149,6 @@ def _particulars(kind: str, axis: str, trained: list[int]) -> list[str]:
         )
     if kind == "robustness" and max(trained) > CHOSEN_RUNS:
         sentences.append(f"Dashed lines: mean of the {CHOSEN_RUNS} runs of an arm that were best on validation.")
-    if kind in _WITH_INTERVALS and min(trained) < ENOUGH_RUNS:
-        sentences.append(f"With fewer than {ENOUGH_RUNS} runs the intervals are too narrow; a single run has none.")
+    if kind in _WITH_INTERVALS:
+        sentences.append(few_runs_sentence(min(trained)))
     return sentences

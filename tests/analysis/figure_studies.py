@@ -81,7 +81,8 @@ def finish(run: RunDirectory, arm: str, seed: int, height: float, generations: i
     write_json(run.champion, grid_champion() if arm == "neat" else modular_champion())
     scores = {"fitness_mean": float(best[-1]), "full_reward_mean": float(best[-1])}
     result = {"training": float(best[-1]), "validation": float(seed), "champion": scores}
-    write_json(run.manifest, {"status": DONE, "result": result})
+    spent = {"episodes": 1000 * generations, "env_steps": int(steps[-1]), "wall_seconds": 1.0}
+    write_json(run.manifest, {"status": DONE, "result": result, "budget_spent": spent})
 
 
 def finish_baseline(run: RunDirectory, arm: str, scale: float) -> None:
