@@ -1,5 +1,6 @@
 """CSV files become statistics, tables and plots; genomes and simulators are never touched."""
 
-from exneat_cli.analysis.run_figures import draw_path, draw_training
+from exneat_cli.analysis.network_graph import draw_network
+from exneat_cli.analysis.run_figures import draw_path, draw_robustness, draw_training
 
-__all__ = ["draw_path", "draw_training"]
+__all__ = ["draw_network", "draw_path", "draw_robustness", "draw_training"]

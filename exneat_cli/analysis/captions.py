@@ -1,4 +1,4 @@
-"""The sentences below tables: what they rest on, and what they do not show."""
+"""The sentences below tables and figures: what they rest on, and what they do not show."""
 
 from __future__ import annotations
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import write_whole
@@ -36,8 +39,14 @@ def style() -> AbstractContextManager[None]:
     return matplotlib.rc_context(_STYLE)
 
 
+def tick_levels(axes: Axes, levels: Iterable[float]) -> None:
+    """Keep the ticks of a horizontal axis whole where all levels are, such as numbers of tiles."""
+    if all(float(level).is_integer() for level in levels):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
 def save_figure(figure: Figure, path: Path) -> list[Path]:
-    """Write ``path.png`` and ``path.svg``; returns both paths.
+    """Write ``path.png`` and ``path.svg``, also where the name has dots of its own; returns both paths.
 
     Raises:
         ExneatError: they cannot be written.
@@ -51,7 +60,7 @@ def save_figure(figure: Figure, path: Path) -> list[Path]:
         buffer = io.BytesIO()
         with style():
             figure.savefig(buffer, format=kind, metadata=metadata, dpi=150)
-        target = path.with_suffix(f".{kind}")
+        target = path.with_name(f"{path.name}.{kind}")
         write_whole(target, buffer.getvalue())
         written.append(target)
     return written

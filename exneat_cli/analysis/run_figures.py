@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.analysis.figures import new_figure, save_figure, style
-from exneat_cli.records import RunDirectory
+from exneat_cli.analysis.figures import new_figure, save_figure, style, tick_levels
+from exneat_cli.records import UNPERTURBED, RunDirectory
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
+MOST_COLUMNS = 3
+_SPREAD = "one standard deviation over episodes"
 
 
 def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
@@ -61,6 +65,39 @@ def draw_path(run: RunDirectory) -> list[Path]:
         figure.colorbar(points, ax=axes, label="control step")
         axes.legend(loc="best")
     return save_figure(figure, run.plots / "path")
+
+
+def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: str) -> list[Path]:
+    """Fitness at each level of each sweep in robustness.csv, as PNG and SVG; no files if it holds no sweep.
+
+    Args:
+        run: whose robustness.csv is drawn.
+        labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
+        fitness_name: label of the vertical axes, e.g. ``forward reward``.
+    """
+    rows = pd.read_csv(run.robustness)
+    sweeps = [name for name in dict.fromkeys(rows["parameter"]) if name != UNPERTURBED]
+    if not sweeps:
+        return []
+    columns = min(len(sweeps), MOST_COLUMNS)
+    lines = math.ceil(len(sweeps) / columns)
+    with style():
+        figure = new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
+        panels = figure.subplots(lines, columns, squeeze=False).ravel()
+        for axes, sweep in zip(panels, sweeps, strict=False):
+            levels = rows[rows["parameter"] == sweep].sort_values("level")
+            x, mean, spread = (levels[column].to_numpy() for column in ("level", "fitness_mean", "fitness_std"))
+            axes.fill_between(
+                x, mean - spread, mean + spread, color="#0072b2", alpha=0.18, linewidth=0.0, label=_SPREAD
+            )
+            axes.plot(x, mean, "o-", color="#0072b2", markersize=4.0, label="mean over episodes")
+            tick_levels(axes, x)
+            axes.set(xlabel=labels.get(sweep, sweep), ylabel=fitness_name)
+        for axes in panels[len(sweeps) :]:
+            axes.remove()
+        figure.suptitle(f"{run.path.name}: robustness")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return save_figure(figure, run.plots / "robustness")
 
 
 def _draw_on_tiles(run: RunDirectory, trace: pd.DataFrame, tiles: pd.DataFrame) -> list[Path]:

@@ -1,7 +1,7 @@
 """Everything on disk: layout, columns, champions, manifests."""
 
 from exneat_cli.records import provenance
-from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.files import read_json, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
@@ -28,6 +28,7 @@ __all__ = [
     "configuration_hash",
     "find_runs",
     "merge_robustness",
+    "plan_from_data",
     "provenance",
     "read_champion",
     "read_json",

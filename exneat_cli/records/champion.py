@@ -78,7 +78,7 @@ def read_champion(path: Path) -> Champion:
             task=dict(content["task"]),
             actuators=tuple(content["actuators"]),
             feed_forward=bool(content["feed_forward"]),
-            plan=_plan_from_data(content["plan"]),
+            plan=plan_from_data(content["plan"]),
             genomes=tuple(genome_from_data(genome) for genome in content["genomes"]),
             scores=dict(content["scores"]),
         )
@@ -126,7 +126,12 @@ def write_hall_of_fame(path: Path, entries: Sequence[Entry], validation: Sequenc
     write_whole(path, "".join(line + "\n" for line in lines))
 
 
-def _plan_from_data(data: dict[str, Any]) -> Plan:
+def plan_from_data(data: dict[str, Any]) -> Plan:
+    """The plan in a champion file, as read from JSON; not checked.
+
+    Raises:
+        KeyError, TypeError, ValueError: a field is missing or of the wrong type.
+    """
     modules = tuple(
         Module(
             name=module["name"],

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from exneat_cli.analysis import draw_path, draw_training
+import pytest
+from matplotlib.figure import Figure
+
+from exneat_cli.analysis import draw_path, draw_robustness, draw_training
+from exneat_cli.analysis.figures import tick_levels
 from exneat_cli.records import HistoryRow, RunDirectory, write_csv, write_history
+from tests.analysis.figure_studies import has_white_edges, write_robustness
 
 
 def a_run(directory: Path) -> RunDirectory:
@@ -40,3 +45,50 @@ def test_a_run_of_a_single_generation_can_be_drawn(tmp_path: Path) -> None:
     run = a_run(tmp_path / "run")
     write_history(run.history, [HistoryRow(1, 2.0, 1.0, 1.5, 2.0, 10, 500, 1, 96, 4, 0, 0, 0.1)])
     assert draw_training(run, "fitness")
+
+
+def sweeps(count: int) -> dict[str, str]:
+    return {f"sweep_{k}": f"label {k}" for k in range(count)}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_robustness_has_a_panel_for_each_sweep_and_none_for_the_unperturbed_row(tmp_path: Path, count: int) -> None:
+    run = a_run(tmp_path / "run")
+    write_robustness(run, "exneat", 0, 0.8, sweeps(count))
+    written = draw_robustness(run, sweeps(count), "forward reward")
+    assert [path.name for path in written] == ["robustness.png", "robustness.svg"]
+    assert has_white_edges(written[0])
+    text = written[1].read_text()
+    assert [label for label in sweeps(9).values() if f"<!-- {label} -->" in text] == list(sweeps(count).values())
+    assert text.count("<!-- forward reward -->") == count
+    assert "<!-- none -->" not in text
+
+
+def test_a_sweep_without_a_label_is_called_by_its_name(tmp_path: Path) -> None:
+    run = a_run(tmp_path / "run")
+    write_robustness(run, "exneat", 0, 0.8, sweeps(1))
+    assert "<!-- sweep_0 -->" in draw_robustness(run, {}, "fitness")[1].read_text()
+
+
+def test_a_run_that_was_never_swept_has_no_picture_of_robustness(tmp_path: Path) -> None:
+    run = a_run(tmp_path / "run")
+    write_robustness(run, "random", 0, 0.8, {})
+    assert draw_robustness(run, {}, "fitness") == []
+    assert not run.plots.exists()
+
+
+def test_equal_robustness_gives_equal_bytes(tmp_path: Path) -> None:
+    one, other = a_run(tmp_path / "a" / "run"), a_run(tmp_path / "b" / "run")
+    for run in (one, other):
+        write_robustness(run, "exneat", 0, 0.8, sweeps(4))
+    for first, second in zip(*(draw_robustness(run, {}, "fitness") for run in (one, other)), strict=True):
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_an_axis_of_whole_levels_has_no_ticks_between_them() -> None:
+    tiles, shares = Figure().subplots(1, 2)
+    for axes, levels in ((tiles, [2.0, 3.0, 4.0]), (shares, [0.0, 0.5, 1.0])):
+        axes.plot(levels, levels)
+        tick_levels(axes, levels)
+    assert all(tick.is_integer() for tick in tiles.get_xticks())
+    assert not all(tick.is_integer() for tick in shares.get_xticks())
