@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import neat
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains.brain import Brain
-from exneat_cli.brains.expression import Expression, express
+from exneat_cli.brains.expression import express
 from exneat_cli.wiring import Module, Plan
 
 
@@ -30,28 +31,29 @@ def assemble(plan: Plan, genomes: Sequence[neat.DefaultGenome], *, feed_forward:
         for index, (genome, shape) in enumerate(zip(genomes, plan.subpopulation_shapes, strict=True))
     ]
     expressions = [networks[module.subpopulation] for module in plan.modules]
-    ends = plan.observation_size + np.cumsum([expression.slots for expression in expressions])
-    bases = [int(end) - expression.slots for end, expression in zip(ends, expressions, strict=True)]
-    links = _Links(plan, bases, first_slot=int(ends[-1]), copies=feed_forward)
-    local_to_slot = [
-        np.array([*links.pin_slots(module), *range(base, base + expression.slots)], dtype=np.int64)
-        for module, base, expression in zip(plan.modules, bases, expressions, strict=True)
-    ]
-    size = int(ends[-1]) + len(links.sources) + 1
-    edge_counts = np.concatenate([expression.edge_count for expression in expressions])
+    bases = list(itertools.accumulate((each.slots for each in expressions), initial=plan.observation_size))
+    links = _Links(plan, bases, first_slot=bases[-1], copies=feed_forward)
+    node_slot: list[int] = []
+    edge_source: list[int] = []
+    for module, base, expression in zip(plan.modules, bases, expressions, strict=False):
+        slot_of = [*links.pin_slots(module), *range(base, base + expression.slots)]
+        node_slot += [slot_of[k] for k in expression.node_slot]
+        edge_source += [slot_of[k] for k in expression.edge_source]
+    size = bases[-1] + len(links.sources) + 1
+    edge_counts = [count for expression in expressions for count in expression.edge_count]
     return Brain(
         observation_size=plan.observation_size,
         size=size,
         recurrent=not feed_forward,
-        node_slot=_joined(expressions, local_to_slot, "node_slot"),
-        edge_start=np.concatenate([[0], np.cumsum(edge_counts)]).astype(np.int64),
-        edge_source=_joined(expressions, local_to_slot, "edge_source"),
-        edge_weight=np.concatenate([expression.edge_weight for expression in expressions]),
-        bias=np.concatenate([expression.bias for expression in expressions]),
-        response=np.concatenate([expression.response for expression in expressions]),
-        activation=np.concatenate([expression.activation for expression in expressions]),
-        link_slot=int(ends[-1]) + np.arange(len(links.sources), dtype=np.int64),
-        link_source=np.array(links.sources, dtype=np.int64),
+        node_slot=np.array(node_slot, np.int64),
+        edge_start=np.array([*itertools.accumulate(edge_counts, initial=0)], np.int64),
+        edge_source=np.array(edge_source, np.int64),
+        edge_weight=np.array([weight for each in expressions for weight in each.edge_weight], np.float64),
+        bias=np.array([bias for each in expressions for bias in each.bias], np.float64),
+        response=np.array([response for each in expressions for response in each.response], np.float64),
+        activation=np.array([code for each in expressions for code in each.activation], np.int64),
+        link_slot=np.arange(bases[-1], bases[-1] + len(links.sources), dtype=np.int64),
+        link_source=np.array(links.sources, np.int64),
         output_slot=_output_slots(plan, bases, silent=size - 1),
     )
 
@@ -86,14 +88,9 @@ class _Links:
         return slots
 
 
-def _joined(expressions: list[Expression], local_to_slot: list[NDArray[np.int64]], field: str) -> NDArray[np.int64]:
-    parts = [slots[getattr(e, field)] for e, slots in zip(expressions, local_to_slot, strict=True)]
-    return np.concatenate(parts)
-
-
 def _output_slots(plan: Plan, bases: list[int], silent: int) -> NDArray[np.int64]:
-    slots = np.full(plan.action_size, silent, dtype=np.int64)
-    for module, base in zip(plan.modules, bases, strict=True):
+    slots = [silent] * plan.action_size
+    for module, base in zip(plan.modules, bases, strict=False):
         for output, actuator in enumerate(module.drives):
             slots[actuator] = base + output
-    return slots
+    return np.array(slots, np.int64)

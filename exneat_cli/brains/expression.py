@@ -1,4 +1,4 @@
-"""From one genome to the arrays of its network, with module-local indices.
+"""From one genome to the entries of its network, with module-local indices.
 
 Local index k below the number of pins is a pin; the rest are value slots of nodes: outputs first, then
 initial hidden nodes if they are linked, then whatever else is evaluated.
@@ -9,28 +9,26 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import neat
-import numpy as np
-from numpy.typing import NDArray
 
 from exneat_cli.brains.brain import ACTIVATION_CODES
 from exneat_cli.errors import ExneatError
 
 
 class Expression(NamedTuple):
-    """A genome's network; fields as in `exneat_cli.brains.brain.Brain`, but with local indices.
+    """A genome's network; entries as in `exneat_cli.brains.brain.Brain`, but with local indices.
 
     Attributes:
         slots: number of value slots, those that are never evaluated and stay 0 included.
     """
 
     slots: int
-    node_slot: NDArray[np.int64]
-    edge_count: NDArray[np.int64]
-    edge_source: NDArray[np.int64]
-    edge_weight: NDArray[np.float64]
-    bias: NDArray[np.float64]
-    response: NDArray[np.float64]
-    activation: NDArray[np.int64]
+    node_slot: list[int]
+    edge_count: list[int]
+    edge_source: list[int]
+    edge_weight: list[float]
+    bias: list[float]
+    response: list[float]
+    activation: list[int]
 
 
 def express(
@@ -64,13 +62,13 @@ def express(
     genes = [genome.nodes[key] for key in evaluated]
     return Expression(
         slots=len(slot_of) + 1,
-        node_slot=np.array([slot_of[key] for key in evaluated], dtype=np.int64),
-        edge_count=np.array([len(links) for links in edges], dtype=np.int64),
-        edge_source=np.array([index_of.get(s, silent) for links in edges for s, _ in links], dtype=np.int64),
-        edge_weight=np.array([weight for links in edges for _, weight in links], dtype=np.float64),
-        bias=np.array([gene.bias for gene in genes], dtype=np.float64),
-        response=np.array([gene.response for gene in genes], dtype=np.float64),
-        activation=np.array([_activation_code(gene) for gene in genes], dtype=np.int64),
+        node_slot=[slot_of[key] for key in evaluated],
+        edge_count=[len(links) for links in edges],
+        edge_source=[index_of.get(source, silent) for links in edges for source, _ in links],
+        edge_weight=[weight for links in edges for _, weight in links],
+        bias=[gene.bias for gene in genes],
+        response=[gene.response for gene in genes],
+        activation=[_activation_code(gene) for gene in genes],
     )
 
 

@@ -87,7 +87,7 @@ def _request(arguments: Sequence[str]) -> Request:
             values[key] = value
         else:
             overrides.append(argument)
-    request = Request(**values, overrides=tuple(overrides))  # type: ignore[arg-type]
+    request = Request(**values, overrides=tuple(overrides))
     check_choice("axis", request.axis, AXES)
     if request.budget is not None:
         check_choice("budget", request.budget, BUDGETS)
