@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 .DEFAULT_GOAL := help
 .PHONY: help ant test check tests format reproduce report bench wheel clean
 
+# Reports take the largest budget that has runs unless BUDGET is given.
+OF_BUDGET := $(if $(BUDGET),budget=$(BUDGET))
 BUDGET ?= quick
 EXPERIMENTS := track_maze general_maze foraging hunting ant
 # One run per core, each on one thread: evolution itself is serial.
@@ -45,13 +47,13 @@ reproduce: $(VENV)/installed ## train what is missing of all experiments, then r
 	$(BIN)/exneat report budget=$(BUDGET) && exit $$status
 
 report: $(VENV)/installed ## every table and figure from the runs there are; trains nothing
-	$(BIN)/exneat report
+	$(BIN)/exneat report $(OF_BUDGET)
 
 figure-%: $(VENV)/installed ## one figure, e.g. make figure-4.3
-	$(BIN)/exneat report only=$@
+	$(BIN)/exneat report only=$@ $(OF_BUDGET)
 
 table-%: $(VENV)/installed ## one table, e.g. make table-5.5
-	$(BIN)/exneat report only=$@
+	$(BIN)/exneat report only=$@ $(OF_BUDGET)
 
 bench: $(VENV)/installed ## how fast it is, as ratios (a few minutes on an idle machine)
 	$(BIN)/python -m tests.bench

@@ -55,7 +55,7 @@ def _terminate(number: int, frame: object) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 2 refused, 130 interrupted.
+    """Run one command; returns its exit code: 0 done, 1 a job failed, 2 refused, 130 interrupted.
 
     Args:
         arguments: without the program's name; None takes the process's own.
@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"exneat: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        print("exneat: interrupted; the same command with resume=true does an unfinished run again", file=sys.stderr)
+        print("exneat: interrupted; the same command goes on (exneat train needs resume=true for it)", file=sys.stderr)
         return 143 if isinstance(interrupt, _Terminated) else 130
     except BrokenPipeError:
         return 0

@@ -52,6 +52,8 @@ class Study:
         conditions: name -> label.
         sweeps: name of a robustness sweep -> label of its axis, with unit.
         runs: all of them.
+        levels: sweep -> the planned levels; None takes whatever levels there are.
+        sweep_episodes: the planned test episodes per level; None takes any number.
     """
 
     experiment: str
@@ -65,6 +67,8 @@ class Study:
     conditions: Mapping[str, str]
     sweeps: Mapping[str, str]
     runs: tuple[PlannedRun, ...]
+    levels: Mapping[str, tuple[float, ...]] | None = None
+    sweep_episodes: int | None = None
 
     @property
     def trained_arms(self) -> tuple[str, ...]:
@@ -96,9 +100,23 @@ class Study:
         return _stacked([(run, pd.read_csv(run.directory.history)) for run in self.of(condition, arm)])
 
     def robustness(self, condition: str, arm: str) -> pd.DataFrame:
-        """robustness.csv of all finished runs that have one, with a column ``seed``; may be empty."""
+        """The planned rows of robustness.csv of all finished runs, with a column ``seed``; may be empty.
+
+        Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
+        """
         runs = [run for run in self.of(condition, arm) if run.directory.robustness.exists()]
-        return _stacked([(run, pd.read_csv(run.directory.robustness)) for run in runs])
+        table = _stacked([(run, pd.read_csv(run.directory.robustness)) for run in runs])
+        return table if table.empty else table[self._is_planned(table)].reset_index(drop=True)
+
+    def _is_planned(self, table: pd.DataFrame) -> pd.Series[bool]:
+        planned = pd.Series(True, index=table.index)
+        if self.sweep_episodes is not None:
+            planned &= table["episodes"] == self.sweep_episodes
+        if self.levels is not None:
+            wanted = {(sweep, float(level)) for sweep, levels in self.levels.items() for level in levels}
+            keys = zip(table["parameter"], table["level"].astype(float), strict=True)
+            planned &= pd.Series([key in wanted for key in keys], index=table.index)
+        return planned
 
     def results(self, condition: str, arm: str) -> pd.DataFrame:
         """One row per finished run: seed, training (final best so far), validation, test, full_reward."""

@@ -13,7 +13,6 @@ from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -36,6 +35,8 @@ _FLAGS_WITH_VALUE = {
     *("--package", "-p", "--cfg", "-c", "--shell-completion", "-sc"),
 }
 _LONGEST_LINE = 300
+BUDGETS = ("paper", "quick", "smoke")
+"""What ``budget=`` may be, the largest first."""
 _NOT_OF_THE_RUN = ("budget", "budgets", "sweep", "sweeps")
 
 
@@ -122,7 +123,7 @@ def composing() -> Iterator[Callable[[Sequence[str]], DictConfig]]:
     def compose_one(overrides: Sequence[str]) -> DictConfig:
         try:
             return hydra.compose("config", overrides=list(overrides))
-        except HydraException as error:
+        except Exception as error:
             raise ExneatError(_in_our_words(error)) from error
 
     with hydra.initialize_config_dir(str(configuration_directory()), version_base="1.3"):
@@ -173,7 +174,7 @@ def _refuse_shadowed_files(directory: Path) -> None:
 def _check_budgets(budgets: object) -> None:
     fields = {"generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes"}
     for name, budget in budgets.items() if isinstance(budgets, dict) else ():
-        check_choice(f"budgets.{name}", name, ("paper", "quick", "smoke"))
+        check_choice(f"budgets.{name}", name, BUDGETS)
         for key in budget if isinstance(budget, dict) else ():
             check_choice(f"budgets.{name}.{key}", key, sorted(fields))
 

@@ -13,8 +13,7 @@ from exneat_cli.commands.drawing import draw_what_is_missing
 from exneat_cli.commands.sweeps import sweeps_from
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.records import RunDirectory
-from exneat_cli.rollouts import Executor
-from exneat_cli.runs import check_sweeps, load_settings, progress_for_terminal, run_robustness
+from exneat_cli.runs import check_sweeps, executor_from, load_settings, progress_for_terminal, run_robustness
 
 _KEYS = {"run", "sweep", "sweeps", "executor"}
 
@@ -33,27 +32,32 @@ def _evaluate(config: DictConfig) -> None:
     plain = plain_from(config)
     if unknown := sorted(set(plain) - _KEYS):
         raise ExneatError(f"{unknown[0]}: unknown key; exneat evaluate knows {', '.join(sorted(_KEYS))}")
-    if not plain["sweeps"]:
+    if not plain.get("sweeps"):
         raise ConfigError("sweep", "what to perturb, e.g. sweep=sensor_noise", "none")
-    executor = Executor(**plain["executor"])
+    executor = executor_from(plain.get("executor", {}))
     planned = []
-    for directory in _directories(plain["run"]):
-        settings = load_settings(directory)
-        asked = sweeps_from(config, settings.task.name)
-        check_sweeps(settings, asked.sweeps, asked.episodes)
+    for directory in _directories(plain.get("run")):
+        try:
+            settings = load_settings(directory)
+            asked = sweeps_from(config, settings.task.name)
+            check_sweeps(settings, asked.sweeps, asked.episodes)
+        except ConfigError as error:
+            raise ExneatError(f"{directory.path}: {error}") from error
         planned.append((directory, settings, asked))
     for directory, settings, asked in planned:
         done = run_robustness(
             directory, asked.sweeps, episodes=asked.episodes, executor=executor, progress=progress_for_terminal()
         )
-        draw_what_is_missing(directory, settings.task.fitness_name, asked.labels, again=done > 0)
+        draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
         print(f"{directory.robustness}: {done} levels tested now" if done else f"{directory.path}: all there already")
 
 
 def _directories(pattern: object) -> list[RunDirectory]:
     if not isinstance(pattern, str) or not pattern:
         raise ConfigError("run", "a run directory, or a pattern such as 'outputs/ant/*'", pattern)
-    found = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]
+    if not glob.has_magic(pattern):
+        return [RunDirectory(Path(pattern))]
+    found = [run for path in sorted(glob.glob(pattern)) if (run := RunDirectory(Path(path))).is_there()]
     if not found:
         raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
-    return [RunDirectory(Path(path)) for path in found]
+    return found

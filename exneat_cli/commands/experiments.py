@@ -14,14 +14,16 @@ import yaml
 from omegaconf import DictConfig
 
 import exneat_cli
-from exneat_cli.commands.composition import composing, settings_from
+from exneat_cli.commands.composition import BUDGETS, composing, settings_from
+from exneat_cli.commands.drawing import missing_figures
 from exneat_cli.commands.sweeps import Sweeps, sweeps_from
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_whole
 from exneat_cli.runs import RunSettings, check_sweeps, is_finished
 
+_FIELDS = {"claim": (str,), "settings": (Mapping,), "arms": (Mapping,), "conditions": (Mapping,), "runs": (Mapping,)}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
-_FORBIDDEN = ("seed", "name", "resume", "sweep", "budget")
-_BUDGETS = ("paper", "quick", "smoke")
+_SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "hydra"}
+"""What the launcher sets itself, so that no arm or condition may."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,15 @@ class Job:
         return f"{self.condition}/{self.arm}/{self.settings.seed}"
 
     def is_finished(self) -> bool:
-        """Whether the run is done and was tested at every level."""
-        return is_finished(self.settings, self.sweeps.sweeps, self.sweeps.episodes)
+        """Whether the run is done and was tested at every level; a damaged one is not."""
+        try:
+            return is_finished(self.settings, self.sweeps.sweeps, self.sweeps.episodes)
+        except ExneatError:
+            return False
+
+    def is_drawn(self) -> bool:
+        """Whether all figures of the finished run are there."""
+        return not missing_figures(self.settings.directory, swept=bool(self.sweeps.sweeps))
 
 
 def experiments_directory() -> Path:
@@ -111,58 +120,103 @@ def read_experiment(name: str) -> Experiment:
     Raises:
         ExneatError: there is no such experiment, or its file is damaged or makes no sense.
     """
-    if not name.endswith(".yaml"):
-        check_choice("experiment", name, experiment_names())
-    path = Path(name) if name.endswith(".yaml") else experiments_directory() / f"{name}.yaml"
+    own = name.endswith((".yaml", ".yml"))
+    if not own and name not in experiment_names():
+        raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
+    path = Path(name) if own else experiments_directory() / f"{name}.yaml"
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
     except OSError as error:
         raise ExneatError(f"experiment={name}: {path} could not be read: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ExneatError(f"{path}: expected YAML, got something else: {' '.join(str(error).split())}") from error
     try:
-        return _experiment(path.stem, content)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ExneatError(f"{path}: expected claim, settings, arms, conditions and runs: {error!r}") from error
+        return _experiment(path.stem, _known("the file", content, _FIELDS))
     except ExneatError as error:
         raise ExneatError(f"{path}: {error}") from error
 
 
+class _StrictLoader(yaml.SafeLoader):
+    """Refuses a key that comes twice, where plain YAML would drop the first one silently."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} comes twice", node.start_mark)
+        return super().construct_mapping(node, deep)
+
+
+def _known(key: str, values: object, fields: Mapping[str, tuple[type, ...]]) -> Mapping[str, Any]:
+    """Check a section's keys and the types of its values; those marked with None may be left out."""
+    if not isinstance(values, Mapping):
+        raise ConfigError(key, f"keys with values: {', '.join(fields)}", values)
+    for name in values:
+        if name not in fields:
+            raise ExneatError(f"{key}: {name}: unknown key; known here: {', '.join(fields)}")
+    for name, types in fields.items():
+        if name not in values and type(None) not in types:
+            raise ExneatError(f"{key}: {name} is missing")
+        if not isinstance(values.get(name), types):
+            expected = " or ".join(each.__name__ for each in types if each is not type(None))
+            raise ConfigError(f"{key}: {name}", f"a value of type {expected}", values[name])
+    return values
+
+
 def _experiment(name: str, content: Mapping[str, Any]) -> Experiment:
-    if unknown := set(content) - {f.name for f in dataclasses.fields(Experiment)} | set(content) & {"name"}:
-        raise ValueError(f"{sorted(unknown)[0]}: unknown key")
-    experiment = Experiment(
+    arms, conditions = content["arms"], content["conditions"]
+    for part, entries in (("arms", arms), ("conditions", conditions)):
+        if not entries:
+            raise ConfigError(part, "at least one entry", entries)
+    for key in (name, *arms, *conditions):
+        if not isinstance(key, str) or not _NAME.fullmatch(key):
+            raise ConfigError("name", "at most 40 letters, digits, '.', '_' and '-'", key)
+    if not content["runs"]:
+        raise ConfigError("runs", f"a number of runs for one of {', '.join(BUDGETS)}", content["runs"])
+    for budget, runs in content["runs"].items():
+        check_choice("runs", budget, BUDGETS)
+        check_whole(f"runs.{budget}", runs, 1, 10_000)
+    return Experiment(
         name=name,
-        claim=str(content["claim"]),
+        claim=content["claim"],
         settings=_overrides("settings", content["settings"]),
-        arms={str(key): Arm(**entry) for key, entry in content["arms"].items()},
-        conditions={str(key): Condition(**entry) for key, entry in content["conditions"].items()},
+        arms={key: _arm(f"arms.{key}", entry) for key, entry in arms.items()},
+        conditions={key: _condition(f"conditions.{key}", entry) for key, entry in conditions.items()},
         runs=dict(content["runs"]),
     )
-    for key in (name, *experiment.arms, *experiment.conditions):
-        if not _NAME.fullmatch(key):
-            raise ConfigError(key, "a short name of letters, digits, '.', '_' and '-'", key)
-    for part, entries in (("arms", experiment.arms), ("conditions", experiment.conditions)):
-        if not entries:
-            raise ConfigError(part, "at least one entry", {})
-        for key, entry in entries.items():
-            _overrides(f"{part}.{key}.settings", entry.settings)
-    for budget, runs in experiment.runs.items():
-        check_choice("runs", budget, _BUDGETS)
-        check_whole(f"runs.{budget}", runs, 1, 10_000)
-    for key, arm in experiment.arms.items():
-        if arm.runs is not None:
-            check_whole(f"arms.{key}.runs", arm.runs, 1, 10_000)
-    return experiment
 
 
-def _overrides(key: str, values: object) -> Mapping[str, Any]:
-    if not isinstance(values, Mapping):
-        raise ConfigError(key, "settings by name, as on the command line, or {}", values)
-    for name in values:
-        if name in _FORBIDDEN:
-            raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", values[name])
-    return values
+def _arm(key: str, entry: object) -> Arm:
+    fields = {"label": (str,), "settings": (Mapping,), "runs": (int, type(None)), "swept": (bool, type(None))}
+    values = _known(key, entry, fields)
+    if values.get("runs") is not None:
+        check_whole(f"{key}.runs", values["runs"], 1, 10_000)
+    return Arm(**{**values, "settings": _overrides(f"{key}.settings", values["settings"])})
+
+
+def _condition(key: str, entry: object) -> Condition:
+    values = _known(key, entry, {"label": (str,), "settings": (Mapping,), "sweeps": (list, type(None))})
+    sweeps = values.get("sweeps") or []
+    for sweep in sweeps:
+        if not isinstance(sweep, str):
+            raise ConfigError(f"{key}.sweeps", "names of sweeps", sweep)
+    return Condition(values["label"], _overrides(f"{key}.settings", values["settings"]), tuple(sweeps))
+
+
+def _overrides(key: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Settings by dotted name; sections within sections are spelled out."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        section = str(name).lstrip("+~").partition(".")[0].partition("/")[0]
+        if section in _SET_HERE:
+            raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
+        if isinstance(value, Mapping):
+            flat.update({f"{name}.{inner}": each for inner, each in _overrides(f"{key}.{name}", value).items()})
+        elif value is None or isinstance(value, str | int | float | list):
+            flat[str(name)] = value
+        else:
+            raise ConfigError(f"{key}.{name}", "a word, a number, true, false, null or a list", value)
+    return flat
 
 
 def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()) -> list[Job]:
@@ -176,12 +230,21 @@ def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()
     Raises:
         ExneatError: settings make no sense, in at least one of the runs.
     """
-    check_choice("budget", budget, tuple(experiment.runs))
+    if budget not in experiment.runs:
+        raise ConfigError("budget", f"one that {experiment.name} has runs for, {', '.join(experiment.runs)}", budget)
     jobs: list[Job] = []
     with composing() as compose:
         for condition in experiment.conditions:
             for arm in experiment.arms:
-                jobs += _jobs(experiment, condition, arm, budget, overrides, compose)
+                try:
+                    jobs += _jobs(experiment, condition, arm, budget, overrides, compose)
+                except ExneatError as error:
+                    raise ExneatError(f"{experiment.name}, {condition}, {arm}: {error}") from error
+    places: dict[Path, Job] = {}
+    for job in jobs:
+        twin = places.setdefault(job.settings.directory.path, job)
+        if twin is not job:
+            raise ExneatError(f"{experiment.name}: {twin.name} and {job.name} are the same run; arms must differ")
     return jobs
 
 

@@ -14,6 +14,7 @@ from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_table
+from exneat_cli.commands.composition import BUDGETS
 from exneat_cli.commands.experiments import (
     Experiment,
     experiment_names,
@@ -22,9 +23,8 @@ from exneat_cli.commands.experiments import (
     read_experiment,
 )
 from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.records import DONE, RunDirectory
 from exneat_cli.wiring import UNTRAINED
-
-BUDGETS = ("paper", "quick", "smoke")
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,9 @@ class Request:
 
     @property
     def directory(self) -> Path:
-        """Where tables, figures and the page go."""
-        return Path(self.output) / "report"
+        """Where tables, figures and the page go; those of a single experiment have a folder of their own."""
+        report = Path(self.output) / "report"
+        return report if self.experiment is None else report / Path(self.experiment).stem
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -62,7 +63,11 @@ def run(arguments: Sequence[str]) -> int:
     request = _request(arguments)
     artefacts = _artefacts(request)
     names = sorted({e for artefact in artefacts.values() for e in _experiments_of(artefact)})
-    studies = {name: _study(read_experiment(request.experiment or name), request) for name in names}
+    experiments = {name: read_experiment(name) for name in names if name in experiment_names()}
+    if request.experiment is not None:
+        own = read_experiment(request.experiment)
+        experiments[own.name] = own
+    studies = {name: _study(experiments[name], request) for name in names}
     if not any(study.finished for study in studies.values()):
         where = f"output={request.output}: no finished run of {', '.join(names)}"
         raise ExneatError(f"{where}\n  {next(iter(studies.values())).command}")
@@ -131,9 +136,12 @@ def _study(experiment: Experiment, request: Request) -> Study:
     jobs = plan_jobs(experiment, budget, [f"output={request.output}", *request.overrides])
     task = jobs[0].settings.task
     labels: dict[str, str] = {}
+    levels: dict[str, tuple[float, ...]] = {}
     for job in jobs:
         labels.update(job.sweeps.labels)
-    name = request.experiment or experiment.name
+        levels.update({sweep.name: sweep.levels for sweep in job.sweeps.sweeps})
+    of_their_own = request.experiment is not None and Path(request.experiment).stem == experiment.name
+    name = request.experiment if of_their_own else experiment.name
     extra = [f"output={request.output}"] if request.output != "outputs" else []
     return Study(
         experiment=experiment.name,
@@ -141,21 +149,25 @@ def _study(experiment: Experiment, request: Request) -> Study:
         claim=experiment.claim,
         command=" ".join(["exneat sweep", f"experiment={name}", f"budget={budget}", *extra, *request.overrides]),
         fitness_name=task.fitness_name,
-        has_full_reward=len(task.terms) > 1 and task.has_initial_pose,
+        has_full_reward=task.has_full_reward,
         arms={name: arm.label for name, arm in experiment.arms.items()},
         baselines=tuple(dict.fromkeys(job.arm for job in jobs if job.settings.algorithm in UNTRAINED)),
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps=labels,
         runs=tuple(PlannedRun(job.condition, job.arm, job.settings.seed, job.settings.directory) for job in jobs),
+        levels=levels,
+        sweep_episodes=jobs[0].sweeps.episodes,
     )
 
 
 def _largest_budget(experiment: Experiment, output: str) -> str:
     for budget in BUDGETS:
-        folders = [Path(output) / f"{experiment.name}-{condition}-{budget}" for condition in experiment.conditions]
-        if any(folder.is_dir() for folder in folders):
-            return budget
-    return "quick"
+        for condition in experiment.conditions:
+            folder = Path(output) / f"{experiment.name}-{condition}-{budget}"
+            runs = (RunDirectory(path.parent) for path in folder.glob("*/manifest.json"))
+            if any(run.read_manifest().get("status") == DONE for run in runs):
+                return budget
+    return next(budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
 
 
 def _build(

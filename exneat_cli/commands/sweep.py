@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
@@ -31,14 +34,25 @@ def run(arguments: Sequence[str]) -> int:
     chosen, overrides = budget_of(overrides)
     budget = chosen or "quick"
     jobs = plan_jobs(experiment, budget, overrides)
-    pending = [job for job in jobs if not job.is_finished()]
+    pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     done_before = len(jobs) - len(pending)
     print(f"{experiment.name}, budget {budget}: {len(jobs)} runs, {done_before} of them finished before", flush=True)
-    launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], time.time())
-    if pending:
-        names = ",".join(f"'{job.name}'" for job in pending)
+    with tempfile.TemporaryDirectory() as notes:
+        launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], Path(notes))
+        if pending:
+            _launch(launch, for_hydra)
+        return _summarise(experiment, launch, done_before)
+
+
+def _launch(launch: Launch, for_hydra: Sequence[str]) -> None:
+    names = ",".join(f"'{name}'" for name in launch.pending)
+    try:
         run_composed("exneat sweep", ["--multirun", f"+job={names}", *for_hydra], launch)
-    return _summarise(experiment, launch, done_before)
+    except ExneatError as error:
+        if not any(job.is_finished() for job in launch.pending.values()):
+            raise
+        # A launcher gives up when one of its processes is killed: what was done by then counts.
+        print(f"exneat: {error}", file=sys.stderr)
 
 
 def _sorted_arguments(arguments: Sequence[str]) -> tuple[str, list[str], list[str]]:
@@ -52,7 +66,9 @@ def _sorted_arguments(arguments: Sequence[str]) -> tuple[str, list[str], list[st
             continue
         elif key.lstrip("+~").startswith("hydra"):
             for_hydra.append(argument)
-        elif argument.startswith("-"):
+        elif key == "seed" and "," in value:
+            raise ExneatError(f"{argument}: a sweep runs seeds of its own, {value.split(',')[0]} and on; set the first")
+        elif argument.startswith(("-", "=")):
             raise ExneatError(f"{argument}: unknown flag; exneat sweep takes settings, written key=value")
         else:
             overrides.append(argument)
@@ -68,15 +84,15 @@ class Launch:
         jobs: all of the experiment's.
         pending: those to be done.
         command: the command line, for manifests.
-        began: seconds since the epoch.
+        notes: a directory where jobs note why they failed.
     """
 
-    def __init__(self, jobs: Sequence[Job], pending: Sequence[Job], command: Sequence[str], began: float) -> None:
+    def __init__(self, jobs: Sequence[Job], pending: Sequence[Job], command: Sequence[str], notes: Path) -> None:
         self.jobs = jobs
         self.pending = {job.name: job for job in pending}
         self.command = command
-        self.began = began
-        self.errors: dict[str, str] = {}
+        self.began = time.time()
+        self.notes = notes
 
     def __call__(self, config: DictConfig) -> None:
         """Do the job that `config` names."""
@@ -91,55 +107,66 @@ class Launch:
             traceback.print_exc()
             self._tell_failure(job, f"{type(error).__name__}: {error}")
         else:
-            print(f"{self._count()} {job.name}: {figure} in {time.time() - began:.1f} s{self._left()}", flush=True)
+            done, left = self._done_and_left()
+            print(f"{done} {job.name}: {figure} in {time.time() - began:.1f} s{left}", flush=True)
+
+    def why_failed(self, job: Job) -> str | None:
+        """What a job noted when it failed; None if it did not."""
+        note = self._note(job)
+        return note.read_text(encoding="utf-8") if note.exists() else None
+
+    def _note(self, job: Job) -> Path:
+        return self.notes / job.name.replace("/", " ")
 
     def _do(self, job: Job, *, show_bar: bool) -> str:
         settings, asked = job.settings, job.sweeps
         progress = progress_for_terminal() if show_bar else Silence()
         finished = train(settings, progress=progress, command=self.command)
         directory = finished.directory
-        tested = run_robustness(
-            directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress
-        )
-        draw_what_is_missing(directory, settings.task.fitness_name, asked.labels, again=tested > 0)
+        run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)
+        draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
         champion = finished.result["champion"]
         return f"{settings.task.fitness_name} {champion['fitness_mean']:.{settings.task.fitness_decimals}f}"
 
     def _tell_failure(self, job: Job, reason: str) -> None:
-        self.errors[job.name] = reason
-        print(f"{self._count()} {job.name}: failed: {reason}", file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # on another machine the directory is not there
+            self._note(job).write_text(reason, encoding="utf-8")
+        print(f"{self._done_and_left()[0]} {job.name}: failed: {reason}", file=sys.stderr, flush=True)
 
-    def _finished(self) -> int:
-        return sum(job.is_finished() for job in self.jobs)
-
-    def _count(self) -> str:
-        return f"[{self._finished():>{len(str(len(self.jobs)))}}/{len(self.jobs)}]"
-
-    def _left(self) -> str:
-        left = len(self.jobs) - self._finished()
+    def _done_and_left(self) -> tuple[str, str]:
+        finished = sum(job.is_finished() for job in self.jobs)
+        left = len(self.jobs) - finished
+        counted = f"[{finished:>{len(str(len(self.jobs)))}}/{len(self.jobs)}]"
         done = len(self.pending) - left
         if left == 0 or done <= 0:
-            return ""
+            return counted, ""
         seconds = (time.time() - self.began) / done * left
-        return f", about {seconds / 60:.0f} min left" if seconds >= 90 else f", about {seconds:.0f} s left"
+        return counted, f", about {seconds / 60:.0f} min left" if seconds >= 90 else f", about {seconds:.0f} s left"
 
 
 def _summarise(experiment: Experiment, launch: Launch, done_before: int) -> int:
-    failed = [job for job in launch.pending.values() if job.name in launch.errors or not job.is_finished()]
+    reasons = {job.name: launch.why_failed(job) or _unfinished_because(job) for job in launch.pending.values()}
+    failed = {name: reason for name, reason in reasons.items() if reason}
     now = len(launch.pending) - len(failed)
     print(f"\n{experiment.name}: {now} runs done, {done_before} skipped as finished before, {len(failed)} failed")
-    for job in failed:
-        print(f"  {job.name}: {launch.errors.get(job.name) or _reason_on_disk(job)}", file=sys.stderr)
+    for name, reason in failed.items():
+        print(f"  {name}: {reason}", file=sys.stderr)
     if failed:
         print("  the same command does what is missing", file=sys.stderr)
     return 1 if failed else 0
 
 
-def _reason_on_disk(job: Job) -> str:
+def _unfinished_because(job: Job) -> str:
+    """Why a job is not finished, from what it left on disk; empty if it is finished."""
     directory = job.settings.directory
+    if job.is_finished():
+        return ""
     if not directory.is_there():
         return "it was not begun"
-    manifest = directory.read_manifest()
+    try:
+        manifest = directory.read_manifest()
+    except ExneatError as error:
+        return str(error)
     if manifest.get("status") == DONE:
         return "it was trained, but not tested at every level"
     return str(manifest.get("error", f"it did not finish (status {manifest.get('status')})"))

@@ -37,6 +37,8 @@ def sweeps_from(config: DictConfig, task: str) -> Sweeps:
         ExneatError: a key is unknown or missing, levels are out of range, or a sweep does not fit the task.
     """
     plain = plain_from(config)
+    if "sweep" not in plain or not plain.get("sweeps"):
+        return Sweeps((), 1, {})
     common = _section("sweep", plain.get("sweep"), {"levels", "episodes"})
     chosen = _section("sweeps", plain.get("sweeps"), None)
     sweeps, labels = [], {}

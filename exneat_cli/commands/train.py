@@ -45,16 +45,15 @@ def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")
-    tested = 0
     if asked.sweeps:
-        tested = run_robustness(
+        run_robustness(
             directory,
             asked.sweeps,
             episodes=asked.episodes,
             executor=settings.executor,
             progress=progress_for_terminal(),
         )
-    draw_what_is_missing(directory, settings.task.fitness_name, asked.labels, again=tested > 0)
+    draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

@@ -65,11 +65,11 @@ def _row(values: Sequence[str]) -> RobustnessRow:
 
 
 def merge_robustness(path: Path, rows: Sequence[RobustnessRow]) -> None:
-    """Add rows to a file, in the order of parameter and level; a new row replaces the old one of its level.
+    """Add rows to a file, in order; a new row replaces the old one of its parameter, level and number of episodes.
 
     Raises:
         ExneatError: the file is damaged or cannot be written.
     """
-    merged = {(row.parameter, row.level): row for row in (*read_robustness(path), *rows)}
+    merged = {(row.parameter, row.level, row.episodes): row for row in (*read_robustness(path), *rows)}
     order = sorted(merged, key=lambda key: (key[0] != UNPERTURBED, *key))
     write_csv(path, RobustnessRow._fields, [merged[key] for key in order])

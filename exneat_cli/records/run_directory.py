@@ -147,6 +147,8 @@ class RunDirectory:
 
     def _is_to_be_done(self, full_hash: str, resume: bool) -> bool:
         if not self.manifest.exists():
+            if resume and self._holds_nothing():
+                return True
             raise ExneatError(
                 f"{self.path}: expected a new directory or a finished run, got one without manifest.json\n"
                 "  remove it, or set name= or output= to another place"
@@ -165,6 +167,10 @@ class RunDirectory:
                 "  add resume=true to do it again from its first generation, with the same results"
             )
         return True
+
+    def _holds_nothing(self) -> bool:
+        """Whether a run that was killed before its manifest was written left this directory."""
+        return all(path.name == self.config.name or path.suffix == ".tmp" for path in self.path.iterdir())
 
     def begin(self, config: str, manifest: dict[str, object]) -> None:
         """Write the first two files, the manifest last; if that fails, a directory that was new is gone again.

@@ -1,6 +1,6 @@
 """Runs episodes on threads: the compiled loop holds no GIL, so they run side by side.
 
-Every episode draws from generators of its own and starts in a fresh world, so results depend neither on
+Every episode draws from generators of its own, and a world is as new for each brain, so results depend neither on
 the number of workers nor on which of them ran what.
 """
 

@@ -4,7 +4,7 @@ from exneat_cli.runs.progress import Bar, Lines, Progress, Silence, progress_for
 from exneat_cli.runs.robustness import check_sweeps, is_finished, load_settings, run_robustness
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
-from exneat_cli.runs.settings import RunSettings
+from exneat_cli.runs.settings import RunSettings, executor_from
 
 __all__ = [
     "Bar",
@@ -14,6 +14,7 @@ __all__ = [
     "RunSettings",
     "Silence",
     "check_sweeps",
+    "executor_from",
     "is_finished",
     "load_settings",
     "progress_for_terminal",

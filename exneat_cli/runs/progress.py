@@ -54,7 +54,7 @@ class Lines:
 
     def say(self, text: str) -> None:
         """Print the line."""
-        print(f"{self._title}: {text}", file=self._stream, flush=True)
+        print(f"{self._title}: {text}" if self._title else text, file=self._stream, flush=True)
 
     def generation(self, row: HistoryRow) -> None:
         """Print every tenth part of the run, and the last generation."""

@@ -117,13 +117,20 @@ def run_robustness(
             (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             todo = Sweep(sweep.name, sweep.parameter, levels)
             seeds = tests_of(settings, episodes)
-            rows = [
-                robustness_row(settings, sweep.name, level, score_all(outcomes)[0])
+            scores = {
+                level: score_all(outcomes)[0]
                 for level, outcomes in run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
-            ]
+            }
+            rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
             merge_robustness(directory.robustness, rows)
+            _count_failures(directory, sweep.name, sum(each.failed_episodes for each in scores.values()))
             done += len(rows)
     return done
+
+
+def _count_failures(directory: RunDirectory, sweep: str, failed: int) -> None:
+    counted = directory.read_manifest().get("failed_robustness_episodes", {})
+    directory.update_manifest(failed_robustness_episodes={**counted, sweep: counted.get(sweep, 0) + failed})
 
 
 def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:

@@ -153,6 +153,15 @@ class RunSettings:
         return _build(cls, values, "")
 
 
+def executor_from(plain: object) -> Executor:
+    """An executor from plain data.
+
+    Raises:
+        ConfigError: a key is unknown, or a value has the wrong type or range.
+    """
+    return _build(Executor, _section("executor", plain), "executor.")
+
+
 def _section(key: str, value: object) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise ConfigError(key, "a section with keys of its own", value)

@@ -88,6 +88,7 @@ class AntTask:
     observation_limits: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
     tie_noise: ClassVar[float] = 0.0
     needs_memory: ClassVar[bool] = False
+    has_full_reward: ClassVar[bool] = True
     has_initial_pose: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -67,6 +67,7 @@ class GridTask:
     failure_floor: ClassVar[float] = 0.0
     tie_noise: ClassVar[float] = 1e-3
     needs_memory: ClassVar[bool] = True
+    has_full_reward: ClassVar[bool] = False
     has_initial_pose: ClassVar[bool] = False
     observation_limits: ClassVar[tuple[float, float]] = (0.0, 1.0)
     trunk: ClassVar[None] = None

@@ -97,6 +97,8 @@ class Task(Protocol):
     """U(0, tie_noise) is added to each entry of the action, where the largest one wins."""
     needs_memory: ClassVar[bool]
     """Whether networks are recurrent by default."""
+    has_full_reward: ClassVar[bool]
+    """Whether there is a second figure besides the fitness."""
     has_initial_pose: ClassVar[bool]
     """Whether `noise.reset_scale` means anything."""
 

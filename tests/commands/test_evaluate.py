@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,13 @@ def test_other_levels_join_those_that_are_there(runs: Path) -> None:
     assert [row.level for row in rows_of(runs, "neat") if row.parameter == "maze_size"] == [7, 9]
 
 
+def test_rows_with_another_number_of_episodes_stand_beside_those_that_are_there(runs: Path) -> None:
+    (neat,) = runs.glob("neat-*")
+    for episodes in (2, 5):
+        assert main(["evaluate", f"run={neat}", "sweep=gap", "sweep.levels=[5]", f"sweep.episodes={episodes}"]) == 0
+    assert {row.episodes for row in rows_of(runs, "neat") if (row.parameter, row.level) == ("gap", 5)} >= {2, 5}
+
+
 def test_without_noise_fusion_is_perfect_and_standing_still_gets_a_quarter(runs: Path) -> None:
     assert evaluate(f"run={runs}/*", "sweep=sensor_noise", "sweep.levels=[0]") == 0
     clean = {
@@ -77,6 +85,8 @@ def test_training_with_a_sweep_ends_with_its_rows_and_another_sweep_does_not_tra
     assert main([*common, "sweep=p_e", "sweep.levels=[0.5]"]) == 0
     assert "finished already" in capsys.readouterr().out
     assert len(rows_of(tmp_path / "hunting", "exneat")) == 3
+    manifest = RunDirectory(next((tmp_path / "hunting").iterdir())).read_manifest()
+    assert manifest["failed_robustness_episodes"] == {"p_m": 0, "p_e": 0}
 
 
 @pytest.mark.parametrize("sweep", SWEEPS)
@@ -109,6 +119,7 @@ BAD = [
     (["run={run}", "sweep=sensor_noise", "sweep.episodes=0"], "sweep.episodes: expected"),
     (["run={run}", "sweep=sensor_noise", "+seed=1"], "seed: unknown key"),
     (["run={run}", "sweep=sensor_noise", "executor.workers=-1"], "executor.workers: expected"),
+    (["run={run}", "sweep=gap", "+executor.foo=1"], "executor.foo: unknown key"),
     (["run={run}/nowhere", "sweep=gap"], "no run is there"),
     (["run={run}/*x", "sweep=gap"], "run: expected a run directory, or a pattern that fits some"),
 ]
@@ -148,10 +159,10 @@ def spoil_manifest(run: RunDirectory, **entries: object) -> None:
     ],
 )
 def test_a_damaged_or_half_written_run_is_refused_in_words(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: object, named: str
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: object, named: str
 ) -> None:
-    assert main(["train", "task=track_maze", "budget=smoke", f"output={tmp_path}"]) == 0
-    (path,) = (tmp_path / "track_maze").iterdir()
+    (sound,) = runs.glob("neat-*")
+    path = Path(shutil.copytree(sound, tmp_path / sound.name))
     spoil(RunDirectory(path))  # type: ignore[operator]
     capsys.readouterr()
     assert main(["evaluate", f"run={path}", "sweep=gap"]) == 2

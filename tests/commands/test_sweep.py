@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 from pathlib import Path
 
@@ -129,21 +130,118 @@ def test_experiments_have_ten_runs_on_paper_and_three_when_quick() -> None:
 BAD_FILES = [
     ({"arms": {}}, "arms: expected at least one entry"),
     ({"conditions": {}}, "conditions: expected at least one entry"),
-    ({"arms": {"neat": {"label": "NEAT"}}}, "expected claim, settings, arms, conditions and runs"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": [1]}}}, "arms.neat.settings: expected settings by name"),
-    ({"arms": {"a/b": {"label": "NEAT", "settings": {}}}}, "a/b: expected a short name"),
+    ({"arms": ["neat"]}, "arms: expected a value of type Mapping"),
+    ({"arms": {"neat": {"label": "NEAT"}}}, "arms.neat: settings is missing"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": [1]}}}, "arms.neat: settings: expected a value of type Mapping"),
+    ({"arms": {"neat": {"label": [1], "settings": {}}}}, "arms.neat: label: expected a value of type str"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "swept": "no"}}}, "arms.neat: swept: expected a value"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "sweeps": []}}}, "arms.neat: sweeps: unknown key"),
+    ({"arms": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),
     ({"arms": {"neat": {"label": "NEAT", "settings": {"seed": 3}}}}, "arms.neat.settings.seed: expected another"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {"++seed": 3}}}}, "arms.neat.settings.++seed: expected another"),
+    ({"settings": {"output": "elsewhere"}}, "settings.output: expected another setting"),
+    ({"settings": {"sweep": {"levels": [1]}}}, "settings.sweep: expected another setting"),
+    ({"settings": {"hydra.job.name": "x"}}, "settings.hydra.job.name: expected another setting"),
+    ({"settings": {"task.gap": datetime.date(2020, 1, 1)}}, "settings.task.gap: expected a word, a number"),
     ({"arms": {"neat": {"label": "NEAT", "settings": {}, "runs": 0}}}, "arms.neat.runs: expected"),
     ({"arms": {"neat": {"label": "NEAT", "settings": {"algorithm": "nead"}}}}, "algorithm=nead: no such option"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "sed: unknown key"),
-    ({"conditions": {"a": {"label": "a", "settings": {"task.gap": 99}}}}, "task.gap: expected"),
+    ({"arms": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "small, clean, neat: sed: unknown key"),
+    ({"arms": {k: {"label": k, "settings": {"algorithm": "neat"}} for k in "ab"}}, "clean/a/0 and clean/b/0 are the"),
+    ({"conditions": {"a": {"label": "a", "settings": {"task.gap": 99}}}}, "small, a, exneat: task.gap: expected"),
+    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": "gap"}}}, "sweeps: expected a value of type list"),
+    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": [1]}}}, "conditions.a.sweeps: expected names"),
     ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["p_m"]}}}, "fits task=track_maze"),
     ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["wind"]}}}, "sweep=wind: no such option"),
+    ({"runs": {}}, "runs: expected a number of runs for one of paper, quick, smoke"),
     ({"runs": {"smoke": 0}}, "runs.smoke: expected"),
-    ({"runs": {"quick": 1}}, "budget: expected one of quick, got 'smoke'"),
+    ({"runs": {"quick": 1}}, "budget: expected one that small has runs for, quick, got 'smoke'"),
     ({"runs": {"large": 1}}, "runs: expected one of paper, quick, smoke, got 'large'"),
     ({"claims": "two"}, "claims: unknown key"),
 ]
+
+
+def test_a_key_that_comes_twice_is_refused_instead_of_dropped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path)
+    path.write_text(path.read_text() + "claim: another\n")
+    assert sweep(tmp_path) == 2
+    assert "the key 'claim' comes twice" in capsys.readouterr().err
+
+
+def test_sections_within_sections_mean_the_same_as_dotted_names(tmp_path: Path) -> None:
+    dotted = plan_jobs(
+        read_experiment(
+            str(
+                write(
+                    tmp_path,
+                    settings={"task": "hunting", "task.p_m": 0.1},
+                    conditions={"calm": {"label": "calm", "settings": {"task.p_e": 0.2, "noise.sensor_std": 0.1}}},
+                )
+            )
+        ),
+        "smoke",
+    )
+    nested = plan_jobs(
+        read_experiment(
+            str(
+                write(
+                    tmp_path,
+                    settings={"task": "hunting", "task.p_m": 0.1},
+                    conditions={
+                        "calm": {"label": "calm", "settings": {"task": {"p_e": 0.2}, "noise": {"sensor_std": 0.1}}}
+                    },
+                )
+            )
+        ),
+        "smoke",
+    )
+    assert [job.settings for job in nested] == [job.settings for job in dotted]
+
+
+def test_damage_in_one_run_leaves_the_others_finished_and_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path)
+    assert sweep(tmp_path) == 0
+    (manifest,) = (tmp_path / "out").glob("small-clean-smoke/neat-*/manifest.json")
+    manifest.write_text("{")
+    capsys.readouterr()
+    assert sweep(tmp_path) == 1
+    shown = capsys.readouterr()
+    assert "0 runs done, 3 skipped as finished before, 1 failed" in shown.out
+    assert "clean/neat/0" in shown.err
+    assert "expected JSON" in shown.err
+
+
+def test_a_directory_that_a_killed_job_had_only_just_made_is_no_obstacle(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    for job in plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])[:2]:
+        job.settings.directory.path.mkdir(parents=True)
+    assert sweep(tmp_path) == 0
+
+
+def test_figures_that_are_missing_are_drawn_by_the_next_call(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert sweep(tmp_path) == 0
+    (picture,) = (tmp_path / "out").glob("small-gap_1-smoke/neat-*/plots/network.svg")
+    before = picture.read_bytes()
+    picture.unlink()
+    assert sweep(tmp_path) == 0
+    assert picture.read_bytes() == before
+
+
+def test_side_by_side_a_failure_is_named_with_its_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    path = write(tmp_path)
+    jobs = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])
+    spoilt = jobs[2].settings.directory.path
+    spoilt.parent.mkdir(parents=True)
+    spoilt.write_text("in the way")
+    assert sweep(tmp_path, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial") == 1
+    shown = capsys.readouterr()
+    assert "3 runs done, 0 skipped as finished before, 1 failed" in shown.out
+    assert f"  {jobs[2].name}: {spoilt}: expected a directory, got a file" in shown.err
 
 
 @pytest.mark.parametrize(("changes", "named"), BAD_FILES, ids=[named for _, named in BAD_FILES])
@@ -163,8 +261,11 @@ def test_an_experiment_that_makes_no_sense_is_refused_before_anything_runs(
     [
         ([], "experiment: expected a name or a YAML file"),
         (["experiment=chess"], "experiment: expected one of ant, foraging"),
+        (["experiment=ant", "seed=0,1"], "a sweep runs seeds of its own"),
+        (["experiment=ant", "noise=5"], "Config group override must be a string"),
+        (["experiment=ant", "=5"], "=5: unknown flag"),
         (["experiment=nowhere.yaml"], "could not be read"),
-        (["experiment=ant", "budget=huge"], "budget: expected one of paper, quick, smoke"),
+        (["experiment=ant", "budget=huge"], "budget: expected one that ant has runs for"),
         (["experiment=ant", "sed=3"], "sed: unknown key"),
         (["experiment=ant", "--fast"], "--fast: unknown flag"),
         (["experiment=ant", "generations=0"], "generations: expected"),
