@@ -97,7 +97,7 @@ def _run_part(study: Study) -> Iterator[str]:
     rows = [_arm_row(study, arm) for arm in study.arms]
     conditions = [c for c in study.conditions if any(study.of(c, arm) for arm in study.trained_arms)]
     yield f'<h3 id="{anchor(f"run-{study.experiment}")}">{text(study.experiment)}</h3>'
-    yield f"<p>{text(study.claim)}</p>"
+    yield f"<p>Claim: {text(study.claim)}</p>"
     yield (
         f"<p>Budget {text(study.budget)}: {len(study.finished)} of {len(study.runs)} runs finished, "
         f"{steps:,} environment steps of training, {took} of training time.</p>"

@@ -156,7 +156,7 @@ def _study(experiment: Experiment, request: Request) -> Study:
         sweeps=labels,
         runs=tuple(PlannedRun(job.condition, job.arm, job.settings.seed, job.settings.directory) for job in jobs),
         levels=levels,
-        sweep_episodes=jobs[0].sweeps.episodes,
+        sweep_episodes=next((job.sweeps.episodes for job in jobs if job.sweeps.sweeps), None),
     )
 
 
