@@ -41,10 +41,15 @@ _NOT_OF_THE_RUN = ("budget", "budgets", "sweep", "sweeps")
 
 
 def configuration_directory() -> Path:
-    """conf/: the copy inside an installed package, else the one beside it in a checkout."""
+    """conf/, see `shipped_directory`."""
+    return shipped_directory("conf")
+
+
+def shipped_directory(name: str) -> Path:
+    """A folder of data: the copy inside an installed package, else the one beside it in a checkout."""
     package = Path(exneat_cli.__file__).parent
-    packaged = package / "conf"
-    return packaged if packaged.is_dir() else package.parent / "conf"
+    packaged = package / name
+    return packaged if packaged.is_dir() else package.parent / name
 
 
 def run_composed(

@@ -13,8 +13,7 @@ from typing import Any
 import yaml
 from omegaconf import DictConfig
 
-import exneat_cli
-from exneat_cli.commands.composition import BUDGETS, composing, settings_from
+from exneat_cli.commands.composition import BUDGETS, composing, settings_from, shipped_directory
 from exneat_cli.commands.drawing import missing_figures
 from exneat_cli.commands.sweeps import Sweeps, sweeps_from
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_whole
@@ -100,10 +99,8 @@ class Job:
 
 
 def experiments_directory() -> Path:
-    """experiments/: the copy inside an installed package, else the one beside it in a checkout."""
-    package = Path(exneat_cli.__file__).parent
-    packaged = package / "experiments"
-    return packaged if packaged.is_dir() else package.parent / "experiments"
+    """experiments/, see `shipped_directory`."""
+    return shipped_directory("experiments")
 
 
 def experiment_names() -> list[str]:

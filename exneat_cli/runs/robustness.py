@@ -139,5 +139,4 @@ def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] |
         if champion.arm != settings.arm:
             raise ExneatError(f"{directory.champion}: expected a champion of {settings.arm}, got {champion.arm}")
         return [champion.brain()]
-    acting = baseline(settings.task, settings.algorithm)
-    return acting if isinstance(acting, RandomActions) else [acting]
+    return baseline(settings.task, settings.algorithm)

@@ -162,9 +162,9 @@ def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, 
     acting = baseline(settings.task, settings.algorithm)
     episodes = tests_of(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_all(runner.run(acting if isinstance(acting, RandomActions) else [acting], episodes))
+        (tested,) = score_all(runner.run(acting, episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
-        trace = runner.trace(acting, episodes[0])
+        trace = runner.trace(acting if isinstance(acting, RandomActions) else acting[0], episodes[0])
     _write_trace(settings, directory, trace)
     merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
     return {"champion": asdict(tested), "standing_still": asdict(standing)}

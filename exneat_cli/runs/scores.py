@@ -62,13 +62,13 @@ def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes
     return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
 
 
-def baseline(task: Task, algorithm: str) -> Brain | RandomActions:
-    """What acts for ``random``, ``motionless`` or ``linear_fusion``."""
+def baseline(task: Task, algorithm: str) -> list[Brain] | RandomActions:
+    """What `Runner.run` needs for ``random``, ``motionless`` or ``linear_fusion``."""
     if algorithm == "random":
         return RandomActions(*task.action_bounds)
     if algorithm == "motionless":
-        return motionless(task.observation_size, task.resting_action)
-    return linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)
+        return [motionless(task.observation_size, task.resting_action)]
+    return [linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)]
 
 
 def tests_of(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:

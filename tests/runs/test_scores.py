@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from exneat_cli.rollouts import Outcomes
-from exneat_cli.runs.scores import baseline_episodes, score_all, summary_sentence
+from exneat_cli.runs.scores import score_all, summary_sentence, tests_of
+from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import generator, shared_episodes
 from exneat_cli.tasks import AntTask
 
@@ -27,15 +28,23 @@ def test_a_score_counts_failures_with_their_floor() -> None:
     assert (tested.full_reward_mean, tested.full_reward_std) == (-40.0, 60.0)
 
 
-def test_a_baseline_faces_the_test_episodes_with_chance_of_the_runs_own() -> None:
+def test_random_actions_face_the_test_episodes_with_chance_of_the_runs_own() -> None:
     def draws(root: int) -> list[list[float]]:
-        return [[generator(seed).random() for seed in seeds] for seeds in baseline_episodes(root, 3)]
+        settings = RunSettings(algorithm="random", seed=root)
+        return [[generator(seed).random() for seed in seeds] for seeds in tests_of(settings, 3)]
 
     tests = [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
     zero, one = np.array(draws(0)), np.array(draws(1))
     np.testing.assert_array_equal(zero[:, :2], np.array(tests)[:, :2])
     np.testing.assert_array_equal(one[:, :2], zero[:, :2])
     assert len(np.unique([zero[:, 2], one[:, 2]])) == 6
+
+
+@pytest.mark.parametrize("algorithm", ["neat", "exneat", "motionless"])
+def test_all_other_arms_face_the_very_same_test_episodes(algorithm: str) -> None:
+    episodes = tests_of(RunSettings(algorithm=algorithm, seed=7), 3)
+    draws = [[generator(seed).random() for seed in seeds] for seeds in episodes]
+    assert draws == [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
 
 
 def figures(*fitness: float, failed: int = 0) -> dict[str, Any]:

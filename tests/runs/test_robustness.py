@@ -1,0 +1,66 @@
+"""Robustness of finished runs, from Python: what was tested already is not tested again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import read_champion, read_robustness
+from exneat_cli.rollouts import Executor, Noise, Runner, Sweep
+from exneat_cli.runs import RunSettings, is_finished, run_robustness, train
+from exneat_cli.runs.robustness import missing_levels
+from exneat_cli.seeding import shared_episodes
+from exneat_cli.tasks import Hunting
+
+SERIAL = Executor("serial")
+
+
+def a_run(output: Path) -> RunSettings:
+    return RunSettings(
+        task=Hunting(p_m=0.3),
+        noise=Noise(0.02),
+        generations=1,
+        population=4,
+        episodes=1,
+        validation_episodes=1,
+        test_episodes=1,
+        output=str(output),
+    )
+
+
+def test_each_level_holds_what_the_champion_gets_in_the_test_episodes(tmp_path: Path) -> None:
+    settings = a_run(tmp_path)
+    directory = train(settings).directory
+    sweep = Sweep("p_m", "task.p_m", (0.0, 1.0))
+    assert run_robustness(directory, [sweep], episodes=4, executor=SERIAL) == 2
+    brain = read_champion(directory.champion).brain()
+    for row in read_robustness(directory.robustness):
+        with Runner(Hunting(p_m=row.level), Noise(0.02), SERIAL, training=False) as runner:
+            fitness = runner.run([brain], shared_episodes("test", 4)).fitness
+        assert row.fitness_mean == fitness.mean()
+        assert row.fitness_std == fitness.std()
+
+
+def test_only_what_is_missing_is_tested_and_workers_do_not_matter(tmp_path: Path) -> None:
+    settings = a_run(tmp_path)
+    directory = train(settings).directory
+    two, three = (Sweep("p_e", "task.p_e", levels) for levels in ((0.0, 0.5), (0.0, 0.5, 1.0)))
+    assert not is_finished(settings, [two], 4)
+    assert run_robustness(directory, [two], episodes=4, executor=SERIAL) == 2
+    assert is_finished(settings, [two], 4)
+    assert missing_levels(directory, three, 4) == (1.0,)
+    assert run_robustness(directory, [three], episodes=4, executor=Executor("threads", 3)) == 1
+    grown = directory.robustness.read_bytes()
+    directory.robustness.unlink()
+    assert run_robustness(directory, [three], episodes=4, executor=SERIAL) == 3
+    assert directory.robustness.read_bytes() == grown
+
+
+def test_a_run_that_another_process_holds_is_refused(tmp_path: Path) -> None:
+    directory = train(a_run(tmp_path)).directory
+    sweep = Sweep("p_m", "task.p_m", (0.0,))
+    with directory.held(), pytest.raises(ExneatError, match="another process is writing this run"):
+        run_robustness(directory, [sweep], episodes=2, executor=SERIAL)
+    assert not directory.robustness.exists()
