@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
 from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.records import read_yaml
 
 FIGURE_KINDS = ("training", "training_runs", "robustness", "cluster", "area", "network")
 QUANTITIES = ("training", "test", "efficiency", "robustness")
@@ -114,16 +113,8 @@ def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:
     Raises:
         ExneatError: the file is missing, or an entry lacks something, has too much or makes no sense.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ExneatError(f"{path}: expected YAML: {error}") from error
-    if not isinstance(content, dict):
-        raise ExneatError(f"{path}: expected names of figures and tables, got {type(content).__name__}")
     artefacts: dict[str, FigurePlan | TablePlan] = {}
-    for name, entry in content.items():
+    for name, entry in read_yaml(path).items():
         try:
             artefacts[str(name)] = _artefact(str(name), dict(entry))
         except (KeyError, TypeError, ValueError, ExneatError) as error:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
 from omegaconf import DictConfig
 
 from exneat_cli.commands.composition import BUDGETS, composing, settings_from, shipped_directory
 from exneat_cli.commands.drawing import missing_figures
 from exneat_cli.commands.sweeps import Sweeps, sweeps_from
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_whole
+from exneat_cli.records import read_yaml
 from exneat_cli.runs import RunSettings, check_sweeps, is_finished
 
 _FIELDS = {"claim": (str,), "settings": (Mapping,), "arms": (Mapping,), "conditions": (Mapping,), "runs": (Mapping,)}
@@ -121,27 +121,11 @@ def read_experiment(name: str) -> Experiment:
     if not own and name not in experiment_names():
         raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
     path = Path(name) if own else experiments_directory() / f"{name}.yaml"
-    try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
-    except OSError as error:
-        raise ExneatError(f"experiment={name}: {path} could not be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ExneatError(f"{path}: expected YAML, got something else: {' '.join(str(error).split())}") from error
+    content = read_yaml(path)
     try:
         return _experiment(path.stem, _known("the file", content, _FIELDS))
     except ExneatError as error:
         raise ExneatError(f"{path}: {error}") from error
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """Refuses a key that comes twice, where plain YAML would drop the first one silently."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} comes twice", node.start_mark)
-        return super().construct_mapping(node, deep)
 
 
 def _known(key: str, values: object, fields: Mapping[str, tuple[type, ...]]) -> Mapping[str, Any]:

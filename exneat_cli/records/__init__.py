@@ -2,7 +2,7 @@
 
 from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
-from exneat_cli.records.files import read_json, write_csv, write_json, write_whole
+from exneat_cli.records.files import read_json, read_yaml, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
@@ -33,6 +33,7 @@ __all__ = [
     "read_champion",
     "read_json",
     "read_robustness",
+    "read_yaml",
     "write_champion",
     "write_csv",
     "write_hall_of_fame",

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from exneat_cli.errors import ExneatError
 
 
@@ -53,6 +55,34 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object
     writer.writerow(columns)
     writer.writerows([repr(float(v)) if isinstance(v, float) else v for v in row] for row in rows)
     write_whole(path, text.getvalue())
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Refuses a key that comes twice, where plain YAML would drop the first one silently."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} comes twice", node.start_mark)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read keys with values from YAML, as data.
+
+    Raises:
+        ExneatError: the file is missing, unreadable, no YAML, names a key twice, or holds something else.
+    """
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ExneatError(f"{path}: expected YAML, got something else: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected keys with values, got {type(content).__name__}")
+    return content
 
 
 def read_json(path: Path) -> dict[str, Any]:

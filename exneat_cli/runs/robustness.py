@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import yaml
-
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champion, read_robustness
+from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champion, read_robustness, read_yaml
 from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
 from exneat_cli.runs.run import MANIFEST_FORMAT
@@ -36,15 +34,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     if manifest.get("status") != DONE:
         mend = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {mend}")
-    try:
-        plain = yaml.safe_load(directory.config.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ExneatError(f"{directory.config}: could not be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ExneatError(f"{directory.config}: expected YAML, got something else") from error
-    if not isinstance(plain, dict):
-        raise ExneatError(f"{directory.config}: expected settings, got {type(plain).__name__}")
-    settings = RunSettings.from_plain(plain)
+    settings = RunSettings.from_plain(read_yaml(directory.config))
     if settings.full_hash != manifest.get("configuration_hash"):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
