@@ -125,10 +125,11 @@ class Runner:
         failed = threading.Event()
 
         def work(simulation: Simulation) -> None:
+            buffers = self._buffers(crew)
             try:
                 while not failed.is_set() and (piece := pieces.take()) is not None:
                     episode, first, last = piece
-                    self._play(simulation, crew, (first, last), episodes[episode], results.of_episode(episode))
+                    self._play(simulation, crew, buffers, (first, last), episodes[episode], results.of_episode(episode))
             except BaseException:
                 failed.set()
                 raise
@@ -142,11 +143,12 @@ class Runner:
     def trace(self, brain: Brain | RandomActions, seeds: EpisodeSeeds) -> Trace:
         """The path of one episode, and the world that it went through."""
         crew = self._crew([brain] if isinstance(brain, Brain) else brain)
+        buffers = self._buffers(crew)
         simulation, results = self._simulations[0], _Results.empty(1, 1, len(self._task.terms))
         columns = len(self._task.trace_columns) + len(self._task.terms)
-        self._play(simulation, crew, (0, 1), seeds, results.of_episode(0))
+        self._play(simulation, crew, buffers, (0, 1), seeds, results.of_episode(0))
         steps = np.zeros((int(results.steps[0, 0]) + 1, columns))
-        self._play(simulation, crew, (0, 1), seeds, results.of_episode(0), steps)
+        self._play(simulation, crew, buffers, (0, 1), seeds, results.of_episode(0), steps)
         return Trace(steps, self._task.tiles(simulation.world))
 
     def _crew(self, brains: Sequence[Brain] | RandomActions) -> _Crew:
@@ -180,6 +182,7 @@ class Runner:
         self,
         simulation: Simulation,
         crew: _Crew,
+        buffers: Buffers,
         chosen: tuple[int, int],
         seeds: EpisodeSeeds,
         results: _Results,
@@ -192,7 +195,7 @@ class Runner:
             *chosen,
             *(generator(seed) for seed in seeds),
             crew.conditions,
-            self._buffers(crew),
+            buffers,
             self._task.observation_size,
             self._halt,
             results.status,
