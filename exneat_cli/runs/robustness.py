@@ -14,7 +14,7 @@ from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champi
 from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
 from exneat_cli.runs.run import MANIFEST_FORMAT
-from exneat_cli.runs.scores import baseline, robustness_row, score_all, tests_of
+from exneat_cli.runs.scores import baseline, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.wiring import UNTRAINED
 
@@ -106,7 +106,7 @@ def run_robustness(
                 continue
             (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             todo = Sweep(sweep.name, sweep.parameter, levels)
-            seeds = tests_of(settings, episodes)
+            seeds = unseen_episodes(settings, episodes)
             scores = {
                 level: score_all(outcomes)[0]
                 for level, outcomes in run_levels(acting, settings.task, settings.noise, todo, executor, seeds)

@@ -31,7 +31,7 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Runner, Trace
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import baseline, robustness_row, score_all, score_brains, summary_sentence, tests_of
+from exneat_cli.runs.scores import baseline, robustness_row, score_all, score_brains, summary_sentence, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
@@ -160,7 +160,7 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
 
 def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
     acting = baseline(settings.task, settings.algorithm)
-    episodes = tests_of(settings, settings.test_episodes)
+    episodes = unseen_episodes(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         (tested,) = score_all(runner.run(acting, episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)

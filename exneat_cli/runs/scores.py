@@ -71,7 +71,7 @@ def baseline(task: Task, algorithm: str) -> list[Brain] | RandomActions:
     return [linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)]
 
 
-def tests_of(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
+def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     """The test episodes, equal for all runs and arms; random actions are drawn from the run's own stream."""
     tests = shared_episodes("test", episodes)
     if settings.algorithm != "random":

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.rollouts import Outcomes
-from exneat_cli.runs.scores import score_all, summary_sentence, tests_of
+from exneat_cli.runs.scores import score_all, summary_sentence, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import generator, shared_episodes
 from exneat_cli.tasks import AntTask
@@ -31,7 +31,7 @@ def test_a_score_counts_failures_with_their_floor() -> None:
 def test_random_actions_face_the_test_episodes_with_chance_of_the_runs_own() -> None:
     def draws(root: int) -> list[list[float]]:
         settings = RunSettings(algorithm="random", seed=root)
-        return [[generator(seed).random() for seed in seeds] for seeds in tests_of(settings, 3)]
+        return [[generator(seed).random() for seed in seeds] for seeds in unseen_episodes(settings, 3)]
 
     tests = [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
     zero, one = np.array(draws(0)), np.array(draws(1))
@@ -42,7 +42,7 @@ def test_random_actions_face_the_test_episodes_with_chance_of_the_runs_own() -> 
 
 @pytest.mark.parametrize("algorithm", ["neat", "exneat", "motionless"])
 def test_all_other_arms_face_the_very_same_test_episodes(algorithm: str) -> None:
-    episodes = tests_of(RunSettings(algorithm=algorithm, seed=7), 3)
+    episodes = unseen_episodes(RunSettings(algorithm=algorithm, seed=7), 3)
     draws = [[generator(seed).random() for seed in seeds] for seeds in episodes]
     assert draws == [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
 
