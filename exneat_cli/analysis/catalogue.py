@@ -49,12 +49,14 @@ class FigurePlan:
         kind: one of `FIGURE_KINDS`.
         title: above the picture, and first in its caption.
         panels: from left to right.
+        arms: the trained arms that it shows; empty for all.
     """
 
     name: str
     kind: str
     title: str
     panels: tuple[Panel, ...]
+    arms: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,8 @@ def _artefact(name: str, entry: dict[str, Any]) -> FigurePlan | TablePlan:
         rows = tuple(_build(TableRow, row) for row in entry.pop("rows"))
         return _build(TablePlan, {"name": name, "columns": columns, "rows": rows, **entry})
     panels = tuple(_panel(kind, panel) for panel in _some(entry.pop("panels")))
-    return _build(FigurePlan, {"name": name, "kind": kind, "panels": panels, **entry})
+    arms = tuple(entry.pop("arms", ()))
+    return _build(FigurePlan, {"name": name, "kind": kind, "panels": panels, "arms": arms, **entry})
 
 
 def _panel(kind: str, values: Mapping[str, Any]) -> Panel:

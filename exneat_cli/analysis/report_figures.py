@@ -63,6 +63,8 @@ def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path,
     check_choice("axis", axis, AXES)
     for panel in plan.panels:
         _check_panel(plan, panel, studies)
+    if plan.arms:
+        studies = {name: study.only(plan.arms) for name, study in studies.items()}
     if plan.kind == "network":
         figure, sentences = draw_champions(plan, studies)
     else:
@@ -80,6 +82,8 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
         _check_known(f"{plan.name}: sweep {whose}", panel.sweep, study.sweeps)
     if panel.arm is not None:
         _check_known(f"{plan.name}: trained arm {whose}", panel.arm, study.trained_arms)
+    for arm in plan.arms:
+        _check_known(f"{plan.name}: trained arm {whose}", arm, study.trained_arms)
     if panel.value == "full_reward" and not study.has_full_reward:
         raise ExneatError(f"{plan.name}: the task {whose} has no full reward; use value: fitness")
     if not study.trained_arms:

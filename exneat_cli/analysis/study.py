@@ -7,8 +7,8 @@ runs with other settings never slip in, whatever else lies in the same folder.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
@@ -74,6 +74,11 @@ class Study:
     def trained_arms(self) -> tuple[str, ...]:
         """Names of the arms that learn."""
         return tuple(name for name in self.arms if name not in self.baselines)
+
+    def only(self, trained: Collection[str]) -> Study:
+        """The same study with these trained arms alone, and its baselines."""
+        kept = {arm: label for arm, label in self.arms.items() if arm in trained or arm in self.baselines}
+        return replace(self, arms=kept, runs=tuple(run for run in self.runs if run.arm in kept))
 
     @functools.cached_property
     def finished(self) -> tuple[PlannedRun, ...]:

@@ -188,3 +188,13 @@ def test_an_experiment_of_baselines_alone_has_nothing_to_show(tmp_path: Path) ->
     study = a_study(tmp_path, arms={"random": "random actions"})
     with pytest.raises(MissingRunsError, match="no arm of made_up is trained"):
         draw_figure(a_plan("training"), {"made_up": study}, tmp_path / "report")
+
+
+def test_a_figure_with_arms_of_its_own_shows_and_needs_no_others(tmp_path: Path) -> None:
+    study = a_study(tmp_path / "runs", arms={"neat": "NEAT", "exneat": "ExNEAT", "fb": "front and back"}, baselines=())
+    plan = replace(a_plan("training"), arms=("neat", "fb"))
+    caption = draw_figure(plan, {"made_up": without(study, "exneat")}, tmp_path).caption
+    assert "front and back 3" in caption
+    assert "ExNEAT" not in caption
+    with pytest.raises(ExneatError, match="trained arm of made_up: expected one of neat, exneat, fb, got 'all'"):
+        draw_figure(replace(plan, arms=("all",)), {"made_up": study}, tmp_path)

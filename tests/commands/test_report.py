@@ -146,3 +146,4 @@ def test_every_condition_and_arm_of_the_catalogue_is_one_of_its_experiment() -> 
             assert part.arm is None or part.arm in experiment.arms
             if getattr(part, "sweep", None):
                 assert part.sweep in experiment.conditions[part.condition].sweeps
+            assert set(getattr(artefact, "arms", ())) <= set(experiment.arms)
