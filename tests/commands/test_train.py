@@ -191,7 +191,9 @@ def composed(*arguments: str) -> RunSettings:
         check=True,
     )
     plain = yaml.safe_load(done.stdout)
-    return RunSettings.from_plain({key: value for key, value in plain.items() if key not in ("budget", "budgets")})
+    for key in ("budget", "budgets", "sweep", "sweeps"):
+        del plain[key]
+    return RunSettings.from_plain(plain)
 
 
 @pytest.mark.parametrize("task", sorted(TASKS))
@@ -208,7 +210,7 @@ def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
 def test_every_key_in_conf_carries_a_comment() -> None:
     bare = []
     for path in sorted(configuration_directory().rglob("*.yaml")):
-        explained_above = path.parent.name in ("algorithm", "geometry", "linkage", "budget")
+        explained_above = path.parent.name in ("algorithm", "geometry", "linkage", "budget", "sweep")
         for line in path.read_text(encoding="utf-8").splitlines():
             is_value = ":" in line and not line.rstrip().endswith(":") and not line.lstrip().startswith(("#", "-"))
             if is_value and "#" not in line and not explained_above and "name:" not in line and "{" not in line:

@@ -114,13 +114,25 @@ def test_an_unfinished_run_is_refused_naming_resume(tmp_path: Path, status: str)
 
 @pytest.mark.parametrize("resume", [True, False])
 def test_somebody_elses_directory_is_never_claimed(tmp_path: Path, resume: bool) -> None:
-    empty = RunDirectory(tmp_path / "empty")
-    empty.path.mkdir()
+    notes = RunDirectory(tmp_path / "notes")
+    notes.path.mkdir()
+    (notes.path / "thoughts.txt").write_text("mine")
     with pytest.raises(ExneatError, match=r"without manifest\.json"):
-        claim(empty, "hash", resume=resume)
+        claim(notes, "hash", resume=resume)
     other = started(tmp_path / "other", "done", "another hash")
     with pytest.raises(ExneatError, match="another configuration"):
         claim(other, "hash", resume=resume)
+
+
+def test_what_a_run_left_that_was_killed_before_its_manifest_is_taken_up_by_resume_alone(tmp_path: Path) -> None:
+    begun = RunDirectory(tmp_path / "begun")
+    begun.path.mkdir()
+    for left in ((), ("config.yaml", ".manifest.json.7.tmp")):
+        for name in left:
+            (begun.path / name).write_text("half")
+        with pytest.raises(ExneatError, match=r"without manifest\.json"):
+            claim(begun, "hash")
+        assert claim(begun, "hash", resume=True) is True
 
 
 def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) -> None:
