@@ -185,5 +185,6 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
 def _settings(task: str, algorithm: str, budget: str, output: str) -> RunSettings:
     path = configuration_directory() / "task" / f"{task}.yaml"
     numbers = yaml.safe_load(path.read_text(encoding="utf-8"))["budgets"][budget]
+    del numbers["sweep_episodes"]
     executor = Executor("threads", 1)
     return RunSettings(task=TASKS[task](), algorithm=algorithm, executor=executor, output=output, **numbers)
