@@ -13,8 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.errors import ExneatError
-from exneat_cli.records import write_whole
+from exneat_cli.records import make_directory, write_whole
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "exneat",
@@ -51,10 +50,7 @@ def save_figure(figure: Figure, path: Path) -> list[Path]:
     Raises:
         ExneatError: they cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExneatError(f"{path.parent}: cannot be made: {error.strerror}") from error
+    make_directory(path.parent)
     written = []
     for kind, metadata in _METADATA.items():
         buffer = io.BytesIO()

@@ -10,8 +10,7 @@ from exneat_cli.analysis.artefacts import Built
 from exneat_cli.analysis.captions import budgets_sentence
 from exneat_cli.analysis.page_frame import anchor, file_links, page, picture, table, text
 from exneat_cli.analysis.study import Study
-from exneat_cli.errors import ExneatError
-from exneat_cli.records import write_whole
+from exneat_cli.records import make_directory, write_whole
 
 _SECTIONS = (
     ("chapter-4", "Chapter 4: figures", ("figure-4.",)),
@@ -49,10 +48,7 @@ def write_index(
     for (name, title), members in sections.items():
         body += [f'<h2 id="{name}">{title}</h2>', *(_artefact_part(directory, each) for each in members)]
     body += ['<h2 id="missing">What is missing</h2>', *_missing_parts(studies, missing)]
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExneatError(f"{directory}: cannot be made: {error.strerror}") from error
+    make_directory(directory)
     path = directory / "index.html"
     write_whole(path, page("exneat report", body))
     return path

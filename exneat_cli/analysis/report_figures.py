@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from matplotlib.artist import Artist
@@ -15,7 +15,8 @@ from exneat_cli.analysis.captions import few_runs_sentence
 from exneat_cli.analysis.catalogue import FigurePlan, Panel
 from exneat_cli.analysis.figures import new_figure, save_figure, style
 from exneat_cli.analysis.network_figures import draw_champions
-from exneat_cli.analysis.robustness_panels import CHOSEN_RUNS, draw_clusters, draw_levels
+from exneat_cli.analysis.quantities import BEST
+from exneat_cli.analysis.robustness_panels import draw_clusters, draw_levels
 from exneat_cli.analysis.study import MissingRunsError, Study
 from exneat_cli.analysis.training_panels import AXIS_LABELS, draw_areas, draw_each_run, draw_means
 from exneat_cli.errors import ExneatError, check_choice
@@ -74,25 +75,20 @@ def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path,
 
 
 def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -> None:
-    _check_known(f"{plan.name}: experiment", panel.experiment, studies)
+    check_choice(f"{plan.name}: experiment", panel.experiment, tuple(studies))
     study = studies[panel.experiment]
     whose = f"of {panel.experiment}"
-    _check_known(f"{plan.name}: condition {whose}", panel.condition, study.conditions)
+    check_choice(f"{plan.name}: condition {whose}", panel.condition, tuple(study.conditions))
     if panel.sweep is not None:
-        _check_known(f"{plan.name}: sweep {whose}", panel.sweep, study.sweeps)
+        check_choice(f"{plan.name}: sweep {whose}", panel.sweep, tuple(study.sweeps))
     if panel.arm is not None:
-        _check_known(f"{plan.name}: trained arm {whose}", panel.arm, study.trained_arms)
+        check_choice(f"{plan.name}: trained arm {whose}", panel.arm, study.trained_arms)
     for arm in plan.arms:
-        _check_known(f"{plan.name}: trained arm {whose}", arm, study.trained_arms)
+        check_choice(f"{plan.name}: trained arm {whose}", arm, study.trained_arms)
     if panel.value == "full_reward" and not study.has_full_reward:
         raise ExneatError(f"{plan.name}: the task {whose} has no full reward; use value: fitness")
     if not study.trained_arms:
         raise MissingRunsError(f"{plan.name}: no arm {whose} is trained, so there are no runs to show")
-
-
-def _check_known(what: str, name: str, known: Collection[str]) -> None:
-    if name not in known:
-        raise ExneatError(f"{what}: expected one of {', '.join(known)}, got {name!r}")
 
 
 def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> tuple[Figure, list[str]]:
@@ -151,8 +147,8 @@ def _particulars(kind: str, axis: str, trained: list[int]) -> list[str]:
         sentences.append(
             "Between generations a run counts with its latest value, and a mean ends where the first of its runs does."
         )
-    if kind == "robustness" and max(trained) > CHOSEN_RUNS:
-        sentences.append(f"Dashed lines: mean of the {CHOSEN_RUNS} runs of an arm that were best on validation.")
+    if kind == "robustness" and max(trained) > BEST:
+        sentences.append(f"Dashed lines: mean of the {BEST} runs of an arm that were best on validation.")
     if kind in _WITH_INTERVALS:
         sentences.append(few_runs_sentence(min(trained)))
     return sentences

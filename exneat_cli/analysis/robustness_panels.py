@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from exneat_cli.analysis.arm_styles import ArmStyle, arm_styles
 from exneat_cli.analysis.catalogue import Panel
 from exneat_cli.analysis.figures import tick_levels
+from exneat_cli.analysis.quantities import BEST, best_on_validation
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import MissingRunsError, Study
 
-CHOSEN_RUNS = 5
-"""Runs of each arm that the thesis shows, best on validation; Zhang (2025), table 5.5."""
 _ROUNDING = 1e-9
 _ANY_ARM = "#444444"
 
@@ -24,7 +23,7 @@ _ANY_ARM = "#444444"
 def draw_levels(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
     """Each arm's mean over runs at each level, with its 95% band; returns the number of runs of each arm.
 
-    The dashed line of an arm is the mean over its `CHOSEN_RUNS` runs best on validation. It is left out
+    The dashed line of an arm is the mean over its `BEST` runs best on validation. It is left out
     where there are no more runs than that. Baselines are grey lines.
 
     Raises:
@@ -38,12 +37,13 @@ def draw_levels(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
         if arm in study.baselines:
             continue
         _draw_band(axes, table, styles[arm].colour)
-        chosen = _best_on_validation(table, panel, study, arm)
-        if chosen:
-            axes.plot(table.index, table[chosen].mean(axis=1), "--", color=styles[arm].colour, linewidth=1.2, zorder=2)
+        if table.shape[1] > BEST:
+            ranked = [seed for seed in best_on_validation(study, panel.condition, arm) if seed in table]
+            mean = table[ranked[:BEST]].mean(axis=1)
+            axes.plot(table.index, mean, "--", color=styles[arm].colour, linewidth=1.2, zorder=2)
             some_are_chosen = True
     if some_are_chosen:
-        label = f"mean of the {CHOSEN_RUNS} runs best on validation"
+        label = f"mean of the {BEST} runs best on validation"
         axes.plot([], [], "--", color=_ANY_ARM, linewidth=1.2, label=label)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
     _label(axes, panel, study)
@@ -120,16 +120,6 @@ def _table(panel: Panel, rows: pd.DataFrame) -> pd.DataFrame:
     if panel.highest is not None:
         rows = rows[rows["level"] <= panel.highest + _ROUNDING]
     return rows.pivot_table(index="level", columns="seed", values=f"{panel.value}_mean")
-
-
-def _best_on_validation(table: pd.DataFrame, panel: Panel, study: Study, arm: str) -> list[int]:
-    """Seeds of the runs that the thesis would show; none where that would be all of them."""
-    if table.shape[1] <= CHOSEN_RUNS:
-        return []
-    results = study.results(panel.condition, arm)
-    results = results[results["seed"].isin(table.columns)]
-    ranked = results.sort_values("validation", ascending=False, kind="stable")
-    return [int(seed) for seed in ranked["seed"].iloc[:CHOSEN_RUNS]]
 
 
 def _label(axes: Axes, panel: Panel, study: Study) -> None:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from exneat_cli.analysis.artefacts import Built
 from exneat_cli.analysis.statistics import Interval
-from exneat_cli.errors import ExneatError
-from exneat_cli.records import write_csv, write_whole
+from exneat_cli.records import make_directory, write_csv, write_whole
 
 LARGE = 10.0
 """Where figures reach this, one decimal says enough; a share between 0 and 1 needs three."""
@@ -71,10 +70,7 @@ def write_table(directory: Path, table: Built, columns: Sequence[str], rows: Ite
     Raises:
         ExneatError: they cannot be written.
     """
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExneatError(f"{directory}: cannot be made: {error.strerror}") from error
+    make_directory(directory)
     exact, readable = directory / f"{table.name}.csv", directory / f"{table.name}.md"
     write_csv(exact, columns, [[csv_cell(value) for value in row] for row in rows])
     write_whole(readable, markdown(f"{table.name}: {table.title}", table.header, table.rows, table.caption))

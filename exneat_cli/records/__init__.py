@@ -2,7 +2,7 @@
 
 from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
-from exneat_cli.records.files import read_json, read_yaml, write_csv, write_json, write_whole
+from exneat_cli.records.files import make_directory, read_json, read_yaml, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
@@ -27,6 +27,7 @@ __all__ = [
     "RunDirectory",
     "configuration_hash",
     "find_runs",
+    "make_directory",
     "merge_robustness",
     "plan_from_data",
     "provenance",

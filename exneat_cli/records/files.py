@@ -34,6 +34,18 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
 
 
+def make_directory(path: Path) -> None:
+    """Make a directory and those above it, unless they are there.
+
+    Raises:
+        ExneatError: something is in the way, or it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExneatError(f"{path}: cannot be made: {error.strerror}") from error
+
+
 def write_json(path: Path, content: object) -> None:
     """Write JSON for people: indented, keys in the order given, NaN refused.
 
