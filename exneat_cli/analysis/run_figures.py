@@ -70,12 +70,15 @@ def draw_path(run: RunDirectory) -> list[Path]:
 def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: str) -> list[Path]:
     """Fitness at each level of each sweep in robustness.csv, as PNG and SVG; no files if it holds no sweep.
 
+    Of a level that was tested more than once, the row with the most episodes is shown.
+
     Args:
         run: whose robustness.csv is drawn.
         labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
         fitness_name: label of the vertical axes, e.g. ``forward reward``.
     """
-    rows = pd.read_csv(run.robustness)
+    rows = pd.read_csv(run.robustness).sort_values(["parameter", "level", "episodes"])
+    rows = rows.drop_duplicates(["parameter", "level"], keep="last")
     sweeps = [name for name in dict.fromkeys(rows["parameter"]) if name != UNPERTURBED]
     if not sweeps:
         return []
@@ -85,7 +88,7 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
         figure = new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, sweep in zip(panels, sweeps, strict=False):
-            levels = rows[rows["parameter"] == sweep].sort_values("level")
+            levels = rows[rows["parameter"] == sweep]
             x, mean, spread = (levels[column].to_numpy() for column in ("level", "fitness_mean", "fitness_std"))
             axes.fill_between(
                 x, mean - spread, mean + spread, color="#0072b2", alpha=0.18, linewidth=0.0, label=_SPREAD

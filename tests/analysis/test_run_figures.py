@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
 from exneat_cli.analysis.figures import tick_levels
-from exneat_cli.records import HistoryRow, RunDirectory, write_csv, write_history
+from exneat_cli.records import HistoryRow, RunDirectory, merge_robustness, read_robustness, write_csv, write_history
 from tests.analysis.figure_studies import has_white_edges, write_robustness
 
 
@@ -82,6 +82,16 @@ def test_equal_robustness_gives_equal_bytes(tmp_path: Path) -> None:
     for run in (one, other):
         write_robustness(run, "exneat", 0, 0.8, sweeps(4))
     for first, second in zip(*(draw_robustness(run, {}, "fitness") for run in (one, other)), strict=True):
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_of_a_level_that_was_tested_twice_the_longer_test_is_shown(tmp_path: Path) -> None:
+    once, twice = a_run(tmp_path / "a" / "run"), a_run(tmp_path / "b" / "run")
+    for run in (once, twice):
+        write_robustness(run, "exneat", 0, 0.8, sweeps(1))
+    hasty = [row._replace(episodes=2, fitness_mean=9.0) for row in read_robustness(twice.robustness)]
+    merge_robustness(twice.robustness, hasty)
+    for first, second in zip(*(draw_robustness(run, {}, "fitness") for run in (once, twice)), strict=True):
         assert first.read_bytes() == second.read_bytes()
 
 
