@@ -1,7 +1,7 @@
 """Team and plan become flat arrays for one compiled kernel; also the brains that follow a fixed rule."""
 
-from exneat_cli.brains.assembly import assemble
-from exneat_cli.brains.brain import Brain
+from exneat_cli.brains.assembly import assemble, assemble_all
+from exneat_cli.brains.brain import Brain, Brains
 from exneat_cli.brains.rules import RandomActions, linear_fusion, motionless
 
-__all__ = ["Brain", "RandomActions", "assemble", "linear_fusion", "motionless"]
+__all__ = ["Brain", "Brains", "RandomActions", "assemble", "assemble_all", "linear_fusion", "motionless"]

@@ -1,20 +1,23 @@
-"""From a team and a wiring plan to one brain."""
+"""From teams and a wiring plan to brains, a whole generation at once."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
-import neat
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains.brain import Brain
-from exneat_cli.brains.expression import express
-from exneat_cli.wiring import Module, Plan
+from exneat_cli.brains.brain import Brain, Brains
+from exneat_cli.brains.expression import Networks, express
+from exneat_cli.brains.wiring_arrays import WiringArrays, wiring_arrays
+from exneat_cli.evolution import ArrayGenome
+from exneat_cli.evolution.structure import row_of
+from exneat_cli.tasks.compiling import compiled
+from exneat_cli.wiring import Plan
 
 
-def assemble(plan: Plan, genomes: Sequence[neat.DefaultGenome], *, feed_forward: bool) -> Brain:
+def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Brain:
     """Compile one genome per subpopulation into the brain that `plan` wires.
 
     Args:
@@ -23,74 +26,105 @@ def assemble(plan: Plan, genomes: Sequence[neat.DefaultGenome], *, feed_forward:
         feed_forward: whether the modules are feed-forward networks, else recurrent ones.
 
     Raises:
-        ExneatError: a genome uses an activation or aggregation that is not supported.
+        ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
     """
-    linked = {m.subpopulation: plan.hidden_is_linked(k) for k, m in enumerate(plan.modules)}
-    networks = [
-        express(genome, shape, feed_forward=feed_forward, hidden_is_linked=linked[index])
-        for index, (genome, shape) in enumerate(zip(genomes, plan.subpopulation_shapes, strict=True))
-    ]
-    expressions = [networks[module.subpopulation] for module in plan.modules]
-    bases = list(itertools.accumulate((each.slots for each in expressions), initial=plan.observation_size))
-    links = _Links(plan, bases, first_slot=bases[-1], copies=feed_forward)
-    node_slot: list[int] = []
-    edge_source: list[int] = []
-    for module, base, expression in zip(plan.modules, bases, expressions, strict=False):
-        slot_of = [*links.pin_slots(module), *range(base, base + expression.slots)]
-        node_slot += [slot_of[k] for k in expression.node_slot]
-        edge_source += [slot_of[k] for k in expression.edge_source]
-    size = bases[-1] + len(links.sources) + 1
-    edge_counts = [count for expression in expressions for count in expression.edge_count]
-    return Brain(
+    return assemble_all(plan, [genomes], feed_forward=feed_forward).first()
+
+
+def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
+    """The brains of several teams, at least one; see `assemble`."""
+    wiring = wiring_arrays(plan)
+    members = len(wiring.shapes)
+    if any(len(team) != members for team in teams):
+        raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
+    networks = express(wiring, [genome for team in teams for genome in team], feed_forward=feed_forward)
+    slots = networks.slots.reshape(-1, members)[:, wiring.subpopulation]
+    bases = wiring.observation_size + np.pad(np.cumsum(slots, axis=1), ((0, 0), (1, 0)))
+    pin_slot = np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index
+    # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
+    # slot still holds the previous step's value anyway.
+    copied = wiring.pin_delayed & feed_forward
+    link_source = pin_slot[:, copied]
+    link_slot = bases[:, -1:] + np.arange(np.count_nonzero(copied))
+    pin_slot[:, copied] = link_slot
+    size = bases[:, -1] + np.count_nonzero(copied) + 1
+    return Brains(
         observation_size=plan.observation_size,
         size=size,
-        recurrent=not feed_forward,
-        node_slot=np.array(node_slot, np.int64),
-        edge_start=np.array([*itertools.accumulate(edge_counts, initial=0)], np.int64),
-        edge_source=np.array(edge_source, np.int64),
-        edge_weight=np.array([weight for each in expressions for weight in each.edge_weight], np.float64),
-        bias=np.array([bias for each in expressions for bias in each.bias], np.float64),
-        response=np.array([response for each in expressions for response in each.response], np.float64),
-        activation=np.array([code for each in expressions for code in each.activation], np.int64),
-        link_slot=np.arange(bases[-1], bases[-1] + len(links.sources), dtype=np.int64),
-        link_source=np.array(links.sources, np.int64),
-        output_slot=_output_slots(plan, bases, silent=size - 1),
+        recurrent=np.full(len(teams), not feed_forward),
+        first_link=np.arange(len(teams) + 1) * np.count_nonzero(copied),
+        link_slot=link_slot.ravel(),
+        link_source=link_source.ravel(),
+        output_slot=np.where(wiring.driver < 0, size[:, None] - 1, bases[:, wiring.driver] + wiring.driver_output),
+        **_join(wiring, networks, bases, pin_slot)._asdict(),
     )
 
 
-class _Links:
-    """The slots that pins read.
+class _Joined(NamedTuple):
+    """The fields of `Brains` that hold nodes and edges."""
 
-    In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent
-    one every slot still holds the previous step's value anyway.
+    first_node: NDArray[np.int64]
+    node_slot: NDArray[np.int64]
+    edge_start: NDArray[np.int64]
+    edge_source: NDArray[np.int64]
+    edge_weight: NDArray[np.float64]
+    bias: NDArray[np.float64]
+    response: NDArray[np.float64]
+    activation: NDArray[np.int64]
+
+
+def _join(wiring: WiringArrays, networks: Networks, bases: NDArray[np.int64], pin_slot: NDArray[np.int64]) -> _Joined:
+    """Networks of modules end to end, in slots of the whole brain.
+
+    Args:
+        wiring: the plan, of M modules and P pins.
+        networks: of all teams.
+        bases: (T, M + 1) the first slot of each module.
+        pin_slot: (T, P) the slot that each pin reads.
     """
-
-    def __init__(self, plan: Plan, bases: list[int], first_slot: int, copies: bool) -> None:
-        self._plan = plan
-        self._bases = bases
-        self._first_slot = first_slot
-        self._copies = copies
-        self.sources: list[int] = []
-
-    def pin_slots(self, module: Module) -> list[int]:
-        slots = []
-        for pin in module.pins:
-            if pin.kind == "sensor":
-                slots.append(pin.index)
-                continue
-            offset = pin.index if pin.kind == "output" else self._plan.modules[pin.module].outputs + pin.index
-            source = self._bases[pin.module] + offset
-            if pin.delayed and self._copies:
-                slots.append(self._first_slot + len(self.sources))
-                self.sources.append(source)
-            else:
-                slots.append(source)
-        return slots
+    per_team = (-1, len(wiring.shapes))
+    evaluated = networks.evaluated.reshape(per_team)[:, wiring.subpopulation]
+    connections = np.diff(networks.first_connection).reshape(per_team)[:, wiring.subpopulation]
+    nodes = int(evaluated.sum())
+    joined = _Joined(
+        first_node=np.cumsum([0, *evaluated.sum(axis=1)]),
+        node_slot=np.zeros(nodes, np.int64),
+        edge_start=np.zeros(nodes + 1, np.int64),
+        edge_source=np.zeros(connections.sum(), np.int64),
+        edge_weight=np.zeros(connections.sum()),
+        bias=np.zeros(nodes),
+        response=np.zeros(nodes),
+        activation=np.zeros(nodes, np.int64),
+    )
+    edges = _fill(wiring, networks, bases, pin_slot, joined)
+    return joined._replace(edge_source=joined.edge_source[:edges], edge_weight=joined.edge_weight[:edges])
 
 
-def _output_slots(plan: Plan, bases: list[int], silent: int) -> NDArray[np.int64]:
-    slots = [silent] * plan.action_size
-    for module, base in zip(plan.modules, bases, strict=False):
-        for output, actuator in enumerate(module.drives):
-            slots[actuator] = base + output
-    return np.array(slots, np.int64)
+@compiled
+def _fill(wiring, networks, bases, pin_slot, joined):  # type: ignore[no-untyped-def]
+    """Write all fields of `joined` but the first; returns the number of edges."""
+    node = edge = 0
+    for t in range(bases.shape[0]):
+        for m in range(wiring.subpopulation.size):
+            g = t * wiring.hidden_is_linked.size + wiring.subpopulation[m]
+            pins = pin_slot[t, wiring.first_pin[m] : wiring.first_pin[m + 1]]
+            first_node, first_connection = networks.first_node[g], networks.first_connection[g]
+            connections = networks.connections[first_connection : networks.first_connection[g + 1]]
+            base = bases[t, m] - pins.size
+            for row in networks.order[first_node : first_node + networks.evaluated[g]]:
+                gene = networks.nodes[first_node + row]
+                joined.node_slot[node] = base + networks.slot_of[first_node + row]
+                joined.bias[node] = gene.bias
+                joined.response[node] = gene.response
+                joined.activation[node] = gene.activation
+                i = row_of(connections, gene.key, -pins.size)
+                while i < connections.size and connections[i].target == gene.key:
+                    if connections[i].enabled:
+                        source = networks.source_of[first_connection + i]
+                        joined.edge_source[edge] = pins[source] if source < pins.size else base + source
+                        joined.edge_weight[edge] = connections[i].weight
+                        edge += 1
+                    i += 1
+                node += 1
+                joined.edge_start[node] = edge
+    return edge

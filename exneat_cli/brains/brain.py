@@ -16,9 +16,6 @@ from numpy.typing import NDArray
 
 from exneat_cli.tasks.compiling import compiled_lean
 
-ACTIVATION_CODES = {"tanh": 0, "relu": 1, "sigmoid": 2, "identity": 3}
-"""neat-python's name of an activation -> its number in the kernel."""
-
 
 class Brain(NamedTuple):
     """A compiled team. E edges, N nodes in the order of evaluation, L links, A actuators.
@@ -32,7 +29,7 @@ class Brain(NamedTuple):
         edge_source: (E,) slot that each edge reads.
         edge_weight: (E,) its weight.
         bias, response: (N,) a node's value is act(bias + response * sum).
-        activation: (N,) numbers of `ACTIVATION_CODES`.
+        activation: (N,) indices into `exneat_cli.evolution.ACTIVATIONS`.
         link_slot, link_source: (L,) at each step's start the source's old value is copied to the slot.
         output_slot: (A,) slot that sets each actuator.
     """
@@ -52,15 +49,11 @@ class Brain(NamedTuple):
     output_slot: NDArray[np.int64]
 
 
-def sizes(brain: Brain) -> tuple[int, int]:
-    """Lengths of the observation and the action that `brain` was wired for."""
-    return brain.observation_size, len(brain.output_slot)
-
-
 class Brains(NamedTuple):
     """Several brains for one task, laid end to end, so that one compiled call can run them all.
 
     Attributes:
+        observation_size: entries of the observation that all were wired for.
         size, recurrent: (B,) of each brain.
         first_node, first_link: (B + 1,) the nodes of brain b are first_node[b] to first_node[b + 1], and so on.
         node_slot, edge_start, edge_source, edge_weight, bias, response, activation: as in `Brain`, nodes and
@@ -69,6 +62,7 @@ class Brains(NamedTuple):
         output_slot: (B, A).
     """
 
+    observation_size: int
     size: NDArray[np.int64]
     recurrent: NDArray[np.bool_]
     first_node: NDArray[np.int64]
@@ -84,9 +78,24 @@ class Brains(NamedTuple):
     link_source: NDArray[np.int64]
     output_slot: NDArray[np.int64]
 
+    def first(self) -> Brain:
+        """The first one, which must be the only one."""
+        own = {name: value for name, value in self._asdict().items() if name in Brain._fields}
+        recurrent = bool(self.recurrent[0])
+        return Brain(**{**own, "size": int(self.size[0]), "recurrent": recurrent, "output_slot": self.output_slot[0]})
+
 
 def lay_out(brains: Sequence[Brain]) -> Brains:
-    """All of `brains`, at least one, end to end."""
+    """All of `brains` end to end.
+
+    Raises:
+        ValueError: there are none, or they were wired for different sizes of observation or action.
+    """
+    sizes = {(brain.observation_size, len(brain.output_slot)) for brain in brains}
+    if len(sizes) != 1:
+        raise ValueError(
+            f"brains: expected at least one, all of one size of observation and action, got {sorted(sizes)}"
+        )
 
     def joined(field: str) -> NDArray[Any]:
         return np.concatenate([getattr(brain, field) for brain in brains])
@@ -94,6 +103,7 @@ def lay_out(brains: Sequence[Brain]) -> Brains:
     edges = np.cumsum([0] + [len(brain.edge_source) for brain in brains])
     starts = [brain.edge_start[:-1] + first for brain, first in zip(brains, edges[:-1], strict=True)]
     return Brains(
+        observation_size=brains[0].observation_size,
         size=np.array([brain.size for brain in brains], np.int64),
         recurrent=np.array([brain.recurrent for brain in brains]),
         first_node=np.cumsum([0] + [len(brain.node_slot) for brain in brains]),

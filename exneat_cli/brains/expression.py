@@ -1,111 +1,148 @@
-"""From one genome to the entries of its network, with module-local indices.
+"""From genomes to networks: which nodes are evaluated, in what order, and where their values are kept.
 
 Local index k below the number of pins is a pin; the rest are value slots of nodes: outputs first, then
-initial hidden nodes if they are linked, then whatever else is evaluated.
+initial hidden nodes if they are linked, then whatever else is evaluated, then one that stays 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import neat
+import numpy as np
+from numpy.typing import NDArray
 
-from exneat_cli.brains.brain import ACTIVATION_CODES
-from exneat_cli.errors import ExneatError
+from exneat_cli.brains.wiring_arrays import WiringArrays
+from exneat_cli.evolution import ArrayGenome
+from exneat_cli.evolution.genes import CONNECTION, NODE, Connections, Nodes, end_to_end
+from exneat_cli.evolution.structure import mark_sources, node_row
+from exneat_cli.tasks.compiling import compiled
 
 
-class Expression(NamedTuple):
-    """A genome's network; entries as in `exneat_cli.brains.brain.Brain`, but with local indices.
+class Networks(NamedTuple):
+    """G genomes end to end, and the networks that they mean.
 
     Attributes:
-        slots: number of value slots, those that are never evaluated and stay 0 included.
+        nodes: (N,) of all genomes.
+        first_node: (G + 1,) the nodes of genome g are first_node[g] to first_node[g + 1].
+        connections: (C,) of all genomes.
+        first_connection: (G + 1,) likewise.
+        evaluated: (G,) how many nodes of each genome are evaluated.
+        slots: (G,) how many value slots each network has.
+        order: (N,) from first_node[g] on, the rows of the nodes to evaluate, counted within the genome.
+        slot_of: (N,) local index of each node's value.
+        source_of: (C,) local index of what each connection reads.
     """
 
-    slots: int
-    node_slot: list[int]
-    edge_count: list[int]
-    edge_source: list[int]
-    edge_weight: list[float]
-    bias: list[float]
-    response: list[float]
-    activation: list[int]
+    nodes: Nodes
+    first_node: NDArray[np.int64]
+    connections: Connections
+    first_connection: NDArray[np.int64]
+    evaluated: NDArray[np.int64]
+    slots: NDArray[np.int64]
+    order: NDArray[np.int64]
+    slot_of: NDArray[np.int64]
+    source_of: NDArray[np.int64]
 
 
-def express(
-    genome: neat.DefaultGenome, shape: tuple[int, int, int], *, feed_forward: bool, hidden_is_linked: bool
-) -> Expression:
-    """The network of `genome`, as neat-python's own network classes build it.
+def express(wiring: WiringArrays, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Networks:
+    """The networks of `genomes`, as neat-python's own network classes build them.
 
     Args:
-        genome: nodes and connections.
-        shape: numbers of inputs, initial hidden nodes and outputs.
+        wiring: the plan; every initial hidden node that other modules read is evaluated if it exists, also where
+            it leads to no output.
+        genomes: team by team, each in the order of the subpopulations.
         feed_forward: evaluate nodes in the order of their dependencies, else all at once.
-        hidden_is_linked: keep every initial hidden node that exists, also where it leads to no output.
 
     Raises:
-        ExneatError: a node's activation or aggregation is not supported.
+        ValueError: a connection has an end that does not exist.
     """
-    inputs, hidden, outputs = shape
-    read_from_outside = list(range(outputs + hidden if hidden_is_linked else outputs))
-    incoming: dict[int, list[tuple[int, float]]] = {}
-    for (source, target), gene in genome.connections.items():
-        if gene.enabled:
-            incoming.setdefault(target, []).append((source, gene.weight))
-    wanted = _ancestors([key for key in read_from_outside if key in genome.nodes], incoming)
-    fed = [key for key in incoming if key in wanted]
-    evaluated = _dependency_order(wanted, incoming) if feed_forward else fed
-    slot_of = {key: inputs + k for k, key in enumerate(dict.fromkeys(read_from_outside + evaluated))}
-    # A source that is never evaluated, such as one on a cycle, stays 0: the last slot is for those.
-    silent = inputs + len(slot_of)
-    index_of = {-1 - pin: pin for pin in range(inputs)} | slot_of
-    edges = [incoming.get(key, []) for key in evaluated]
-    genes = [genome.nodes[key] for key in evaluated]
-    return Expression(
-        slots=len(slot_of) + 1,
-        node_slot=[slot_of[key] for key in evaluated],
-        edge_count=[len(links) for links in edges],
-        edge_source=[index_of.get(source, silent) for links in edges for source, _ in links],
-        edge_weight=[weight for links in edges for _, weight in links],
-        bias=[gene.bias for gene in genes],
-        response=[gene.response for gene in genes],
-        activation=[_activation_code(gene) for gene in genes],
+    nodes = end_to_end((genome.nodes for genome in genomes), NODE)
+    connections = end_to_end((genome.connections for genome in genomes), CONNECTION)
+    networks = Networks(
+        nodes=nodes,
+        first_node=np.cumsum([0] + [len(genome.nodes) for genome in genomes]),
+        connections=connections,
+        first_connection=np.cumsum([0] + [len(genome.connections) for genome in genomes]),
+        evaluated=np.zeros(len(genomes), np.int64),
+        slots=np.zeros(len(genomes), np.int64),
+        order=np.zeros(len(nodes), np.int64),
+        slot_of=np.zeros(len(nodes), np.int64),
+        source_of=np.zeros(len(connections), np.int64),
     )
+    _express(wiring.shapes, wiring.hidden_is_linked, networks, feed_forward)
+    return networks
 
 
-def _ancestors(keys: list[int], incoming: dict[int, list[tuple[int, float]]]) -> set[int]:
-    found = set(keys)
-    queue = list(keys)
-    while queue:
-        for source, _ in incoming.get(queue.pop(), []):
-            if source >= 0 and source not in found:
-                found.add(source)
-                queue.append(source)
-    return found
+@compiled
+def _express(shapes, hidden_is_linked, networks, feed_forward):  # type: ignore[no-untyped-def]
+    for g in range(networks.evaluated.size):
+        a, b = networks.first_node[g], networks.first_node[g + 1]
+        c, d = networks.first_connection[g], networks.first_connection[g + 1]
+        nodes, connections = networks.nodes[a:b], networks.connections[c:d]
+        order, slot_of, source_of = networks.order[a:b], networks.slot_of[a:b], networks.source_of[c:d]
+        inputs, hidden, outputs = shapes[g % hidden_is_linked.size]
+        read_outside = outputs + (hidden if hidden_is_linked[g % hidden_is_linked.size] else 0)
+        _find_sources(nodes, connections, inputs, source_of)
+        evaluated = _order(nodes, connections, source_of, read_outside, feed_forward, order)
+        networks.evaluated[g] = evaluated
+        networks.slots[g] = _assign_slots(nodes, order[:evaluated], inputs, read_outside, slot_of)
+        for i in range(connections.size):
+            source_of[i] = -1 - source_of[i] if source_of[i] < 0 else slot_of[source_of[i]]
 
 
-def _dependency_order(wanted: set[int], incoming: dict[int, list[tuple[int, float]]]) -> list[int]:
-    """Nodes after everything that they read; those on or behind a cycle are left out."""
-    waiting_for = {key: {s for s, _ in incoming.get(key, []) if s >= 0} for key in sorted(wanted)}
-    readers: dict[int, list[int]] = {}
-    for key, sources in waiting_for.items():
-        for source in sources:
-            readers.setdefault(source, []).append(key)
-    ready = [key for key, sources in waiting_for.items() if not sources]
-    order = []
-    while ready:
-        key = ready.pop()
-        order.append(key)
-        for reader in readers.get(key, []):
-            waiting_for[reader].discard(key)
-            if not waiting_for[reader]:
-                ready.append(reader)
-    return order
+@compiled
+def _find_sources(nodes, connections, inputs, source_of):  # type: ignore[no-untyped-def]
+    """Write the row of the node that each connection reads, or -1 - k for pin k."""
+    for i in range(connections.size):
+        source = connections[i].source
+        source_of[i] = source if source < 0 else node_row(nodes, source)
+        missing = source < -inputs or (source >= 0 and source_of[i] < 0)
+        if missing or node_row(nodes, connections[i].target) < 0:
+            raise ValueError("a connection of a genome has an end that does not exist")
 
 
-def _activation_code(gene: neat.genes.DefaultNodeGene) -> int:
-    if gene.aggregation != "sum":
-        raise ExneatError(f"node {gene.key}: expected aggregation sum, got {gene.aggregation!r}")
-    if gene.activation not in ACTIVATION_CODES:
-        known = ", ".join(ACTIVATION_CODES)
-        raise ExneatError(f"node {gene.key}: expected an activation of {known}, got {gene.activation!r}")
-    return ACTIVATION_CODES[gene.activation]
+@compiled
+def _order(nodes, connections, source_of, read_outside, feed_forward, order):  # type: ignore[no-untyped-def]
+    """Write the rows of the nodes to evaluate into the head of `order`; returns how many they are.
+
+    Of a recurrent network, all that are wanted and have an input. Of a feed-forward one, all that are wanted, after
+    everything that they read; those on or behind a cycle are left out.
+    """
+    wanted = nodes["key"] < read_outside
+    mark_sources(nodes, connections, wanted, True)
+    placed = np.zeros(nodes.size, np.bool_)
+    count, before = 0, -1
+    while count > before:
+        before = count
+        edge = 0
+        for row in range(nodes.size):
+            fed, ready = False, wanted[row] and not placed[row]
+            while edge < connections.size and connections[edge].target == nodes[row].key:
+                if connections[edge].enabled:
+                    fed = True
+                    ready = ready and (not feed_forward or source_of[edge] < 0 or placed[source_of[edge]])
+                edge += 1
+            if ready and (fed or feed_forward):
+                placed[row] = True
+                order[count] = row
+                count += 1
+    return count
+
+
+@compiled
+def _assign_slots(nodes, evaluated, inputs, read_outside, slot_of):  # type: ignore[no-untyped-def]
+    """Write the local index of each node; returns how many slots there are."""
+    slots = read_outside
+    slot_of[:] = -1
+    for row in range(nodes.size):
+        if nodes[row].key < read_outside:
+            slot_of[row] = inputs + nodes[row].key
+    for row in evaluated:
+        if slot_of[row] < 0:
+            slot_of[row] = inputs + slots
+            slots += 1
+    for row in range(nodes.size):
+        if slot_of[row] < 0:
+            slot_of[row] = inputs + slots
+    return slots + 1

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains.brain import ACTIVATION_CODES, Brain
+from exneat_cli.brains.brain import Brain
+from exneat_cli.evolution import ACTIVATIONS
 from exneat_cli.tasks import Sector
 
 
@@ -56,7 +57,7 @@ def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Br
         edge_weight=weights[targets, sources],
         bias=np.array(bias, dtype=np.float64),
         response=np.ones(actions),
-        activation=np.full(actions, ACTIVATION_CODES["identity"], dtype=np.int64),
+        activation=np.full(actions, ACTIVATIONS.index("identity"), dtype=np.int64),
         link_slot=none,
         link_source=none,
         output_slot=slots,

@@ -49,8 +49,8 @@ def _show(run: RunDirectory) -> None:
 
 def _show_module(champion: Champion, module: Module) -> None:
     genome = champion.genomes[module.subpopulation]
-    enabled = sum(gene.enabled for gene in genome.connections.values())
-    hidden = len(genome.nodes) - module.outputs
+    nodes, enabled = genome.size()
+    hidden = nodes - module.outputs
     x, y = module.position
     print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
     print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
@@ -58,7 +58,10 @@ def _show_module(champion: Champion, module: Module) -> None:
         print(f"  reads    {line}")
     drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
     print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
-    print(f"  network  {len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs, ", end="")
+    print(
+        f"  network  {len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs, ",
+        end="",
+    )
     print(f"{enabled} enabled of {len(genome.connections)} connections\n")
 
 

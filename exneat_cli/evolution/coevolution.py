@@ -13,6 +13,7 @@ from typing import NamedTuple
 import neat
 from numpy.random import SeedSequence
 
+from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.seeding import generator
 
@@ -27,7 +28,7 @@ class Team(NamedTuple):
         ids: their ids; a team that meets the next generation intact keeps them.
     """
 
-    genomes: tuple[neat.DefaultGenome, ...]
+    genomes: tuple[ArrayGenome, ...]
     ids: tuple[int, ...]
 
 
@@ -76,7 +77,7 @@ class Coevolution:
             self._advance()
         orders = [self._order(index) for index in range(len(self._subpopulations))]
         self._teams = [
-            Team(tuple(s.genomes[key] for s, key in zip(self._subpopulations, ids, strict=True)), ids)
+            Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
             for ids in zip(*orders, strict=True)
         ]
         return list(self._teams)

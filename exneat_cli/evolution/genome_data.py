@@ -2,55 +2,75 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-import neat
-from neat.genes import DefaultConnectionGene, DefaultNodeGene
+import numpy as np
 
-Genome = neat.DefaultGenome
-"""What every room beyond this one knows of a genome's type."""
+from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE
 
 
-def genome_to_data(genome: neat.DefaultGenome) -> dict[str, Any]:
-    """The genome as numbers, strings, lists and dicts; nodes and connections keep their order."""
+def genome_to_data(genome: ArrayGenome) -> dict[str, Any]:
+    """The genome as numbers, strings, lists and dicts."""
     return {
         "id": genome.key,
         "nodes": [
-            {"id": key, "bias": node.bias, "response": node.response, "activation": node.activation}
-            for key, node in genome.nodes.items()
+            {"id": key, "bias": bias, "response": response, "activation": ACTIVATIONS[activation]}
+            for key, bias, response, activation in genome.nodes.tolist()
         ],
         "connections": [
-            {
-                "from": source,
-                "to": target,
-                "weight": gene.weight,
-                "enabled": gene.enabled,
-                "innovation": gene.innovation,
-            }
-            for (source, target), gene in genome.connections.items()
+            {"from": source, "to": target, "weight": weight, "enabled": enabled, "innovation": innovation}
+            for target, source, innovation, weight, enabled in genome.connections.tolist()
         ],
     }
 
 
-def genome_from_data(data: dict[str, Any]) -> neat.DefaultGenome:
-    """The genome that `genome_to_data` was given, equal in everything that a network depends on.
+def genome_from_data(data: dict[str, Any]) -> ArrayGenome:
+    """The genome that `genome_to_data` was given.
 
     Raises:
-        KeyError, TypeError, ValueError: a field is missing or of the wrong type.
+        KeyError, OverflowError, TypeError, ValueError: a field is missing, of the wrong type or not finite; a node
+            or connection comes twice; a connection leads from or to a node that does not exist.
     """
-    genome = neat.DefaultGenome(int(data["id"]))
-    for entry in data["nodes"]:
-        node = DefaultNodeGene(int(entry["id"]))
-        node.bias = float(entry["bias"])
-        node.response = float(entry["response"])
-        node.activation = str(entry["activation"])
-        node.aggregation = "sum"
-        node.time_constant = 1.0
-        genome.nodes[node.key] = node
-    for entry in data["connections"]:
-        key = int(entry["from"]), int(entry["to"])
-        gene = DefaultConnectionGene(key, innovation=int(entry["innovation"]))
-        gene.weight = float(entry["weight"])
-        gene.enabled = bool(entry["enabled"])
-        genome.connections[key] = gene
+    genome = ArrayGenome(int(data["id"]))
+    nodes = [
+        (
+            int(entry["id"]),
+            _finite(entry["bias"]),
+            _finite(entry["response"]),
+            ACTIVATIONS.index(entry["activation"]),
+        )
+        for entry in data["nodes"]
+    ]
+    connections = [
+        (
+            int(entry["to"]),
+            int(entry["from"]),
+            int(entry["innovation"]),
+            _finite(entry["weight"]),
+            bool(entry["enabled"]),
+        )
+        for entry in data["connections"]
+    ]
+    _check_ends({node[0] for node in nodes}, [connection[:2] for connection in connections])
+    if len({node[0] for node in nodes}) < len(nodes) or min((node[0] for node in nodes), default=0) < 0:
+        raise ValueError("expected nodes with different ids of at least 0")
+    genome.nodes = np.array(sorted(nodes), NODE)
+    genome.connections = np.array(sorted(connections), CONNECTION)
     return genome
+
+
+def _check_ends(nodes: set[int], ends: list[tuple[int, ...]]) -> None:
+    if len(set(ends)) < len(ends):
+        raise ValueError("expected at most one connection between two nodes")
+    for target, source in ends:
+        if target not in nodes or (source >= 0 and source not in nodes):
+            raise ValueError(f"the connection from {source} to {target} has an end that does not exist")
+
+
+def _finite(value: object) -> float:
+    number = float(value)  # type: ignore[arg-type]
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number, got {value!r}")
+    return number

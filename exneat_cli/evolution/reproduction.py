@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import neat
 from neat.species import DefaultSpeciesSet
 
@@ -15,7 +17,7 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
 
     def reproduce(
         self, config: neat.Config, species: DefaultSpeciesSet, pop_size: int, generation: int
-    ) -> dict[int, neat.DefaultGenome]:
+    ) -> dict[int, Any]:
         """The next generation by id, after elitism and minimum species size were cut to what fits."""
         configured = self.reproduction_config
         elitism, min_species_size = configured.elitism, configured.min_species_size
@@ -23,7 +25,7 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
         configured.elitism = min(elitism, share)
         configured.min_species_size = min(min_species_size, share)
         try:
-            genomes: dict[int, neat.DefaultGenome] = super().reproduce(config, species, pop_size, generation)
+            genomes: dict[int, Any] = super().reproduce(config, species, pop_size, generation)
             return genomes
         finally:
             configured.elitism, configured.min_species_size = elitism, min_species_size

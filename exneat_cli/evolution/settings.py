@@ -6,15 +6,18 @@ import tempfile
 from configparser import ConfigParser
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import neat
 
 from exneat_cli.errors import check_choice, check_flag, check_real, check_whole
-from exneat_cli.evolution.genome import HomologousGenome
+from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.genes import ACTIVATIONS
+from exneat_cli.evolution.initial_connections import INITIAL_CONNECTIONS
 from exneat_cli.evolution.reproduction import SteadyReproduction
+from exneat_cli.evolution.stock_genome import HomologousGenome
 
-ACTIVATIONS = ("tanh", "relu", "sigmoid", "identity")
-INITIAL_CONNECTIONS = ("full_nodirect", "full_direct", "unconnected", "fs_neat_nohidden", "fs_neat_hidden")
+GENOMES = {"array": ArrayGenome, "stock": HomologousGenome}
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,8 @@ class EvolutionSettings:
     augmenting topologies", 2002). Rates and shares are probabilities in [0, 1].
 
     Attributes:
+        genome: ``array`` for compiled operators, ``stock`` for neat-python's own, which are slower and draw
+            other random numbers.
         feed_forward: feed-forward networks, else recurrent ones.
         activation: of every node, with neat-python's scaling, e.g. tanh(2.5 x).
         initial_connection: connections of the first generation.
@@ -49,6 +54,7 @@ class EvolutionSettings:
         ConfigError: a value is out of range.
     """
 
+    genome: str = "array"
     feed_forward: bool = True
     activation: str = "tanh"
     initial_connection: str = "full_nodirect"
@@ -79,6 +85,7 @@ class EvolutionSettings:
     species_elitism: int = 2
 
     def __post_init__(self) -> None:
+        check_choice("evolution.genome", self.genome, tuple(GENOMES))
         check_flag("evolution.feed_forward", self.feed_forward)
         check_flag("evolution.positive_start", self.positive_start)
         check_choice("evolution.activation", self.activation, ACTIVATIONS)
@@ -129,7 +136,7 @@ def neat_config(
     settings: EvolutionSettings,
     population: int,
     shape: tuple[int, int, int],
-    genome_type: type[neat.DefaultGenome] = HomologousGenome,
+    genome_type: type[Any] | None = None,
 ) -> neat.Config:
     """A neat-python configuration of its own for one subpopulation.
 
@@ -137,8 +144,9 @@ def neat_config(
         settings: see there.
         population: genomes per generation.
         shape: numbers of inputs, initial hidden nodes and outputs.
-        genome_type: the genome's class; neat-python's own serves for comparison.
+        genome_type: the genome's class, if not what the settings say.
     """
+    genome_type = genome_type or GENOMES[settings.genome]
     inputs, hidden, outputs = shape
     sections: dict[str, dict[str, object]] = {
         "NEAT": {
@@ -211,7 +219,7 @@ def _change(name: str, rate: float, replace: float, power: float) -> dict[str, o
     return {f"{name}_mutate_rate": rate, f"{name}_replace_rate": replace, f"{name}_mutate_power": power}
 
 
-def _read_config(sections: dict[str, dict[str, object]], genome_type: type[neat.DefaultGenome]) -> neat.Config:
+def _read_config(sections: dict[str, dict[str, object]], genome_type: type[Any]) -> neat.Config:
     parser = ConfigParser()
     parser.read_dict(sections)
     with tempfile.TemporaryDirectory() as directory:

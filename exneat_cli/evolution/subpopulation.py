@@ -6,10 +6,14 @@ import random
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
 import neat
 from neat.reporting import ReporterSet
 from numpy.random import SeedSequence
+
+from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.conversion import from_stock
 
 _GLOBAL_RANDOM_STATE = threading.Lock()
 """Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
@@ -27,7 +31,7 @@ class Subpopulation:
         seed: of its random state.
 
     Attributes:
-        genomes: the current generation by id, in neat-python's order.
+        genomes: the current generation by id, in neat-python's order; of the configuration's class.
     """
 
     def __init__(self, config: neat.Config, seed: SeedSequence) -> None:
@@ -39,13 +43,18 @@ class Subpopulation:
         self._species = config.species_set_type(config.species_set_config, reporters)
         self._generation = 0
         with self._own_random_state():
-            self.genomes: dict[int, neat.DefaultGenome] = self._create()
+            self.genomes: dict[int, Any] = self._create()
             self._species.speciate(config, self.genomes, self._generation)
 
     @property
     def species_count(self) -> int:
         """Number of species in the current generation."""
         return len(self._species.species)
+
+    def in_arrays(self, key: int) -> ArrayGenome:
+        """The genome with this id, whatever the configuration's class is."""
+        genome = self.genomes[key]
+        return genome if isinstance(genome, ArrayGenome) else from_stock(genome)
 
     def advance(self, fitness: Mapping[int, float]) -> bool:
         """Replace the generation by the next one; returns whether all species had died out.
@@ -66,8 +75,8 @@ class Subpopulation:
         self._generation += 1
         return extinct
 
-    def _create(self) -> dict[int, neat.DefaultGenome]:
-        genomes: dict[int, neat.DefaultGenome] = self._reproduction.create_new(
+    def _create(self) -> dict[int, Any]:
+        genomes: dict[int, Any] = self._reproduction.create_new(
             self.config.genome_type, self.config.genome_config, self.config.pop_size
         )
         return genomes

@@ -10,7 +10,7 @@ from typing import Any
 
 from exneat_cli.brains import Brain, assemble
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Entry, Genome, genome_from_data, genome_to_data
+from exneat_cli.evolution import ArrayGenome, Entry, genome_from_data, genome_to_data
 from exneat_cli.records.files import read_json, write_json, write_whole
 from exneat_cli.wiring import Module, Pin, Plan
 
@@ -36,7 +36,7 @@ class Champion:
     actuators: tuple[str, ...]
     feed_forward: bool
     plan: Plan
-    genomes: tuple[Genome, ...]
+    genomes: tuple[ArrayGenome, ...]
     scores: dict[str, Any]
 
     def brain(self) -> Brain:
@@ -84,7 +84,7 @@ def read_champion(path: Path) -> Champion:
         )
         _check(champion)
         return champion
-    except (KeyError, TypeError, ValueError, AttributeError, AssertionError, IndexError, ExneatError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise ExneatError(f"{path}: damaged: {type(error).__name__}: {error}") from error
 
 

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions, motionless
-from exneat_cli.brains.brain import Brains, lay_out, memory_size, sizes
+from exneat_cli.brains import Brain, Brains, RandomActions, motionless
+from exneat_cli.brains.brain import lay_out, memory_size
 from exneat_cli.errors import check_choice, check_whole
 from exneat_cli.rollouts.episode import Buffers, Conditions, episode_loop
 from exneat_cli.rollouts.noise import Noise
@@ -113,7 +113,7 @@ class Runner:
         self._halt[0] = True
         self._pool.shutdown(cancel_futures=True)
 
-    def run(self, brains: Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
+    def run(self, brains: Brains | Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
         """Outcomes of every brain (one, if it acts at random) in every episode.
 
         Raises:
@@ -151,7 +151,7 @@ class Runner:
         self._play(simulation, crew, buffers, (0, 1), seeds, results.of_episode(0), steps)
         return Trace(steps, self._task.tiles(simulation.world))
 
-    def _crew(self, brains: Sequence[Brain] | RandomActions) -> _Crew:
+    def _crew(self, brains: Brains | Sequence[Brain] | RandomActions) -> _Crew:
         """Brains end to end; refuses those that compiled code would let read and write elsewhere."""
         task = self._task
         actions = len(task.actuator_names)
@@ -159,13 +159,13 @@ class Runner:
         if isinstance(brains, RandomActions):
             low, high = brains
             brains = [motionless(task.observation_size, np.zeros(len(low)))]
-        expected, came = (task.observation_size, actions), {sizes(brain) for brain in brains}
-        if came != {expected}:
-            what = f"sizes {expected} of observation and action"
-            raise ValueError(f"brains: expected at least one, each of {what}, got {sorted(came)}")
+        brains = brains if isinstance(brains, Brains) else lay_out(brains)
+        expected, came = (task.observation_size, actions), (brains.observation_size, brains.output_slot.shape[1])
+        if came != expected:
+            raise ValueError(f"brains: expected sizes {expected} of observation and action, got {came}")
         lowest, highest = task.observation_limits
         conditions = Conditions(float(self._noise.sensor_std), float(lowest), float(highest), low, high - low)
-        return _Crew(lay_out(brains), conditions)
+        return _Crew(brains, conditions)
 
     def _buffers(self, crew: _Crew) -> Buffers:
         conditions, steps = crew.conditions, self._task.longest_episode

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exneat_cli.brains import assemble
+from exneat_cli.brains import assemble_all
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, neat_config
 from exneat_cli.records import HistoryRow
@@ -102,8 +102,8 @@ class _Training:
     def _evaluate(self, teams: Sequence[Team], generation: int) -> Outcomes:
         settings = self._settings
         seeds = training_episodes(settings.seed, generation, settings.episodes)
-        feed_forward = settings.evolution.feed_forward
-        brains = [assemble(self._plan, team.genomes, feed_forward=feed_forward) for team in teams]
+        genomes = [team.genomes for team in teams]
+        brains = assemble_all(self._plan, genomes, feed_forward=settings.evolution.feed_forward)
         return self._runner.run(brains, seeds)
 
     def _record(self, best_team: Team, fitness: Sequence[float], best_fitness: float, outcomes: Outcomes) -> None:
@@ -119,8 +119,8 @@ class _Training:
                 episodes=outcomes.steps.size + (before.episodes if before else 0),
                 env_steps=int(outcomes.steps.sum()) + (before.env_steps if before else 0),
                 species=self._coevolution.species_count,
-                connections=sum(gene.enabled for g, _ in genomes for gene in g.connections.values()),
-                hidden_nodes=sum(len(genome.nodes) - outputs for genome, (_, _, outputs) in genomes),
+                connections=sum(genome.size()[1] for genome, _ in genomes),
+                hidden_nodes=sum(genome.size()[0] - outputs for genome, (_, _, outputs) in genomes),
                 failed_episodes=int(outcomes.failed.sum()),
                 extinctions=self._coevolution.extinctions,
                 wall_seconds=round(time.perf_counter() - self._began, 3),

@@ -20,7 +20,7 @@ from typing import Any
 import numba
 from numba import config
 
-_COMPILED_ROOMS = ("tasks", "brains", "rollouts")
+_COMPILED_ROOMS = ("tasks", "evolution", "brains", "rollouts")
 _CACHE_SET_UP = threading.Lock()
 
 

@@ -8,7 +8,7 @@ import neat
 import numpy as np
 
 from exneat_cli.brains import Brain, assemble
-from exneat_cli.evolution import EvolutionSettings, neat_config
+from exneat_cli.evolution import ArrayGenome, EvolutionSettings, neat_config
 from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
@@ -35,7 +35,7 @@ class Workload(NamedTuple):
     """
 
     config: neat.Config
-    genomes: list[neat.DefaultGenome]
+    genomes: list[ArrayGenome]
     seeds: EpisodeSeeds
 
     def first(self, count: int) -> Workload:

@@ -12,7 +12,8 @@ import pytest
 
 from exneat_cli.brains import Brain, assemble, linear_fusion, motionless
 from exneat_cli.brains.brain import Brains, activate, lay_out, memory_size
-from exneat_cli.evolution import EvolutionSettings, neat_config
+from exneat_cli.evolution import EvolutionSettings, from_stock, neat_config, to_stock
+from exneat_cli.evolution.stock_genome import HomologousGenome
 from exneat_cli.tasks import AntTask, Sector
 from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_wiring
 
@@ -92,7 +93,7 @@ def random_team(plan: Plan, settings: EvolutionSettings, seed: int) -> list[neat
     random.seed(seed)
     genomes = []
     for shape in plan.subpopulation_shapes:
-        config = neat_config(settings, 10, shape)
+        config = neat_config(settings, 10, shape, HomologousGenome)
         config.genome_config.innovation_tracker = neat.innovation.InnovationTracker()
         genome = config.genome_type(1)
         genome.configure_new(config.genome_config)
@@ -106,8 +107,9 @@ def random_team(plan: Plan, settings: EvolutionSettings, seed: int) -> list[neat
 
 
 def assert_equal_to_reference(plan: Plan, genomes: list[neat.DefaultGenome], feed_forward: bool, seed: int) -> None:
-    brains = lay_out([assemble(plan, genomes, feed_forward=feed_forward)])
-    slow = SlowTeam(plan, genomes, feed_forward)
+    converted = [from_stock(genome) for genome in genomes]
+    brains = lay_out([assemble(plan, converted, feed_forward=feed_forward)])
+    slow = SlowTeam(plan, [to_stock(genome) for genome in converted], feed_forward)
     observations = np.random.default_rng(seed).normal(size=(STEPS, plan.observation_size))
     actions = actions_of(brains, 0, observations)
     for action, observation in zip(actions, observations, strict=True):
@@ -184,7 +186,8 @@ def brains_of_many_sizes(settings: EvolutionSettings) -> list[Brain]:
     for feed_forward in (True, False):
         for seed, (geometry, linkage) in enumerate([("single", "hidden"), ("all", "none"), ("all", "output")]):
             plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
-            brains.append(assemble(plan, random_team(plan, settings, seed), feed_forward=feed_forward))
+            genomes = [from_stock(genome) for genome in random_team(plan, settings, seed)]
+            brains.append(assemble(plan, genomes, feed_forward=feed_forward))
     return brains
 
 

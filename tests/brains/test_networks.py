@@ -14,7 +14,7 @@ from neat.genes import DefaultConnectionGene, DefaultNodeGene
 from exneat_cli.brains import assemble
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import EvolutionSettings, neat_config
+from exneat_cli.evolution import ArrayGenome, EvolutionSettings, from_stock, neat_config, to_stock
 from exneat_cli.wiring import Module, Pin, Plan
 
 INPUTS, HIDDEN, OUTPUTS = 5, 3, 3
@@ -37,7 +37,7 @@ def single_module_plan(inputs: int = INPUTS, hidden: int = HIDDEN, outputs: int 
     return Plan((module,), inputs, outputs)
 
 
-def random_genome(seed: int, config: neat.Config, mutations: int) -> neat.DefaultGenome:
+def random_genome(seed: int, config: neat.Config, mutations: int) -> ArrayGenome:
     """A genome after many structural mutations, with a quarter of its connections disabled."""
     with global_random(seed):
         config.genome_config.innovation_tracker = neat.innovation.InnovationTracker()
@@ -49,21 +49,24 @@ def random_genome(seed: int, config: neat.Config, mutations: int) -> neat.Defaul
             gene.enabled = random.random() > 0.25
         for node in genome.nodes.values():
             node.response = random.uniform(-2.0, 2.0)
-    return genome
+    return from_stock(genome)
 
 
 def wild(settings: EvolutionSettings) -> EvolutionSettings:
     rates = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.6)
-    return EvolutionSettings(**{**vars(settings), **rates, "weight_sd": 1.0, "bias_sd": 1.0})  # type: ignore[arg-type]
+    changes = {**rates, "genome": "stock", "weight_sd": 1.0, "bias_sd": 1.0}
+    return EvolutionSettings(**{**vars(settings), **changes})  # type: ignore[arg-type]
 
 
-def assert_equal_outputs(genome: neat.DefaultGenome, config: neat.Config, network: object, recurrent: bool) -> None:
+def assert_equal_outputs(genome: ArrayGenome, config: neat.Config, recurrent: bool) -> None:
+    kind = neat.nn.RecurrentNetwork if recurrent else neat.nn.FeedForwardNetwork
+    network = kind.create(to_stock(genome), config)
     brains = lay_out([assemble(single_module_plan(), [genome], feed_forward=not recurrent)])
     memory, action = np.zeros(memory_size(brains)), np.zeros(OUTPUTS)
     rng = np.random.default_rng(genome.key)
     for _ in range(STEPS):
         memory[:INPUTS] = rng.normal(size=INPUTS)
-        expected = network.activate(memory[:INPUTS].copy())  # type: ignore[attr-defined]
+        expected = network.activate(memory[:INPUTS].copy())
         activate(brains, 0, memory, action)
         np.testing.assert_allclose(action, expected, rtol=1e-12, atol=0.0)
 
@@ -74,8 +77,7 @@ def test_feed_forward_outputs_equal_neat_pythons(ant_settings: EvolutionSettings
     config = neat_config(settings, 10, (INPUTS, HIDDEN, OUTPUTS))
     for seed in range(75):
         genome = random_genome(seed, config, mutations=1 + seed % 40)
-        network = neat.nn.FeedForwardNetwork.create(genome, config)
-        assert_equal_outputs(genome, config, network, recurrent=False)
+        assert_equal_outputs(genome, config, recurrent=False)
 
 
 @pytest.mark.parametrize("activation", ["tanh", "relu", "sigmoid", "identity"])
@@ -86,8 +88,8 @@ def test_recurrent_outputs_equal_neat_pythons(ant_settings: EvolutionSettings, a
     cyclic = 0
     for seed in range(75):
         genome = random_genome(seed, config, mutations=1 + seed % 40)
-        cyclic += any(source == target for source, target in genome.connections)
-        assert_equal_outputs(genome, config, neat.nn.RecurrentNetwork.create(genome, config), recurrent=True)
+        cyclic += bool((genome.connections["source"] == genome.connections["target"]).any())
+        assert_equal_outputs(genome, config, recurrent=True)
     assert cyclic > 50
 
 
@@ -95,8 +97,8 @@ def test_random_genomes_have_lost_nodes_and_disabled_connections(ant_settings: E
     config = neat_config(wild(ant_settings), 10, (INPUTS, HIDDEN, OUTPUTS))
     genomes = [random_genome(seed, config, mutations=20) for seed in range(50)]
     initial_hidden = set(range(OUTPUTS, OUTPUTS + HIDDEN))
-    assert any(not initial_hidden <= set(genome.nodes) for genome in genomes)
-    disabled = [genome for genome in genomes if not all(gene.enabled for gene in genome.connections.values())]
+    assert any(not initial_hidden <= set(genome.nodes["key"].tolist()) for genome in genomes)
+    disabled = [genome for genome in genomes if not genome.connections["enabled"].all()]
     assert len(disabled) > 40
 
 
@@ -104,7 +106,8 @@ def hand_made(nodes: list[int], edges: list[tuple[int, int, float]], activation:
     genome = neat.DefaultGenome(1)
     for key in nodes:
         node = DefaultNodeGene(key)
-        node.bias, node.response, node.activation, node.aggregation = 0.3, 1.0, activation, "sum"
+        node.bias, node.response, node.activation = 0.3, 1.0, activation
+        node.aggregation, node.time_constant = "sum", 1.0
         genome.nodes[key] = node
     for innovation, (source, target, weight) in enumerate(edges, start=1):
         gene = DefaultConnectionGene((source, target), innovation=innovation)
@@ -127,11 +130,10 @@ def test_odd_feed_forward_graphs_equal_neat_pythons(
     ant_settings: EvolutionSettings, edges: list[tuple[int, int, float]]
 ) -> None:
     config = neat_config(ant_settings, 10, (INPUTS, HIDDEN, OUTPUTS))
-    genome = hand_made([0, 1, 2, 3, 4, 5], edges)
-    assert_equal_outputs(genome, config, neat.nn.FeedForwardNetwork.create(genome, config), recurrent=False)
+    assert_equal_outputs(from_stock(hand_made([0, 1, 2, 3, 4, 5], edges)), config, recurrent=False)
 
 
 def test_an_unsupported_activation_is_refused_by_name() -> None:
     genome = hand_made([0, 1, 2], [(-1, 0, 1.0)], activation="gauss")
     with pytest.raises(ExneatError, match=r"node \d: expected an activation of tanh, .*got 'gauss'"):
-        assemble(single_module_plan(), [genome], feed_forward=True)
+        from_stock(genome)

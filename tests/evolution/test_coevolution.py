@@ -11,7 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exneat_cli.evolution import Coevolution, EvolutionSettings, Team, neat_config
+from exneat_cli.evolution import (
+    ArrayGenome,
+    Coevolution,
+    EvolutionSettings,
+    Team,
+    from_stock,
+    genome_to_data,
+    neat_config,
+    to_stock,
+)
 from exneat_cli.evolution.coevolution import best_first, separate_ties
 from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.seeding import stream
@@ -28,15 +37,14 @@ def coevolution(
     return Coevolution(configs, seeds, stream(seed, "pairing"), pairing)
 
 
-def fingerprint(genome: neat.DefaultGenome) -> tuple[object, ...]:
-    nodes = [(key, n.bias, n.response, n.activation) for key, n in genome.nodes.items()]
-    connections = [(key, g.weight, g.enabled, g.innovation) for key, g in genome.connections.items()]
-    return genome.key, tuple(nodes), tuple(connections)
+def fingerprint(genome: ArrayGenome) -> object:
+    return genome_to_data(genome)
 
 
 def synthetic(team: Team) -> float:
     """A cheap fitness that depends on every genome: large weights are good, large networks a little bad."""
-    weights = [abs(gene.weight) for genome in team.genomes for gene in genome.connections.values() if gene.enabled]
+    tables = [genome.connections for genome in team.genomes]
+    weights = [abs(weight) for table in tables for weight in table["weight"][table["enabled"]].tolist()]
     return math.fsum(weights) / (1 + len(weights)) - 0.01 * len(weights)
 
 
@@ -44,14 +52,14 @@ def test_one_subpopulation_evolves_exactly_like_neat_population(ant_settings: Ev
     changes = {"node_add": 0.3, "connection_add": 0.4, "distance_threshold": 1.0, "max_stagnation": 3}
     settings = EvolutionSettings(**{**vars(ant_settings), **changes})
     shape = (2, 1, 1)
-    theirs: list[list[tuple[object, ...]]] = []
+    theirs: list[list[object]] = []
 
     def fitness_of(genome: neat.DefaultGenome, config: neat.Config) -> float:
         network = neat.nn.FeedForwardNetwork.create(genome, config)
         return float(4.0 - sum((network.activate(inputs)[0] - target) ** 2 for inputs, target in XOR))
 
     def evaluate(genomes: list[tuple[int, neat.DefaultGenome]], config: neat.Config) -> None:
-        theirs.append([fingerprint(genome) for _, genome in genomes])
+        theirs.append([fingerprint(from_stock(genome)) for _, genome in genomes])
         for _, genome in genomes:
             genome.fitness = fitness_of(genome, config)
 
@@ -68,7 +76,7 @@ def test_one_subpopulation_evolves_exactly_like_neat_population(ant_settings: Ev
         teams = ours.ask()
         assert [fingerprint(team.genomes[0]) for team in teams] == theirs[generation]
         species.add(ours.species_count)
-        ours.tell([fitness_of(team.genomes[0], config) for team in teams])
+        ours.tell([fitness_of(to_stock(team.genomes[0]), config) for team in teams])
     assert max(species) > 1
 
 
@@ -82,10 +90,12 @@ def test_evolution_leaves_pythons_random_state_alone(ant_settings: EvolutionSett
 
 @pytest.mark.parametrize("tied", [False, True], ids=["distinct", "heavily tied"])
 @pytest.mark.parametrize("subpopulations", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("genome", ["array", "stock"])
 def test_the_best_team_meets_the_next_generation_intact(
-    ant_settings: EvolutionSettings, subpopulations: int, tied: bool
+    ant_settings: EvolutionSettings, genome: str, subpopulations: int, tied: bool
 ) -> None:
-    settings = EvolutionSettings(**{**vars(ant_settings), "distance_threshold": 0.8, "max_stagnation": 4})
+    changes = {"genome": genome, "distance_threshold": 0.8, "max_stagnation": 4}
+    settings = EvolutionSettings(**{**vars(ant_settings), **changes})
     evolution = coevolution(settings, subpopulations, population=30, seed=3)
     rng = np.random.default_rng(subpopulations)
     most_species = 0
@@ -131,7 +141,7 @@ def test_initial_hidden_nodes_have_the_same_ids_also_after_an_extinction(ant_set
         teams = evolution.ask()
         if evolution.extinctions == 2:
             extinctions += 1
-            assert all(set(genome.nodes) == {0, 1, 2} for team in teams for genome in team.genomes)
+            assert all(genome.nodes["key"].tolist() == [0, 1, 2] for team in teams for genome in team.genomes)
         evolution.tell([1.0] * len(teams))
     assert extinctions >= 2
 
@@ -162,9 +172,12 @@ def test_separated_ties_keep_the_order_and_never_rise(fitness: list[float]) -> N
     assert max(abs(a - b) for a, b in zip(separated, fitness, strict=True)) <= 60 * max(np.spacing(1e6), 1e-9)
 
 
-def test_two_seeds_evolve_differently_and_one_seed_repeats(ant_settings: EvolutionSettings) -> None:
-    def run(seed: int) -> list[tuple[object, ...]]:
-        evolution = coevolution(ant_settings, 2, population=10, seed=seed)
+@pytest.mark.parametrize("genome", ["array", "stock"])
+def test_two_seeds_evolve_differently_and_one_seed_repeats(ant_settings: EvolutionSettings, genome: str) -> None:
+    settings = EvolutionSettings(**{**vars(ant_settings), "genome": genome})
+
+    def run(seed: int) -> list[object]:
+        evolution = coevolution(settings, 2, population=10, seed=seed)
         for _ in range(3):
             teams = evolution.ask()
             evolution.tell([synthetic(team) for team in teams])

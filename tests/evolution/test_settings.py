@@ -44,7 +44,7 @@ def test_a_positive_start_makes_initial_weights_positive_and_lets_mutations_draw
 
     def weights() -> list[float]:
         genomes = subpopulation.genomes.values()
-        return [gene.weight for genome in genomes for gene in genome.connections.values()]
+        return [weight for genome in genomes for weight in genome.connections["weight"].tolist()]
 
     assert min(weights()) >= 0.0
     assert 0.7 < float(np.mean(weights())) < 0.9

@@ -12,7 +12,7 @@ import pytest
 
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.brains.rules import weighted_sums
-from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
+from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config, to_stock
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.seeding import EpisodeSeeds, generator, shared_episodes, stream, training_episodes
 from exneat_cli.tasks import AntTask, mujoco_library
@@ -188,17 +188,17 @@ def test_an_exploding_brain_gets_the_failure_floor_and_leaves_the_others_alone(w
 @pytest.mark.parametrize(
     ("acting", "came"),
     [
-        (motionless(3, np.zeros(8)), r"\[\(3, 8\)\]"),
-        (motionless(105, np.zeros(2)), r"\[\(105, 2\)\]"),
-        (motionless(200, np.zeros(8)), r"\[\(200, 8\)\]"),
-        (RandomActions(np.zeros(3), np.ones(3)), r"\[\(105, 3\)\]"),
+        (motionless(3, np.zeros(8)), r"\(3, 8\)"),
+        (motionless(105, np.zeros(2)), r"\(105, 2\)"),
+        (motionless(200, np.zeros(8)), r"\(200, 8\)"),
+        (RandomActions(np.zeros(3), np.ones(3)), r"\(105, 3\)"),
     ],
 )
 def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(
     acting: Brain | RandomActions, came: str
 ) -> None:
     (seeds,) = shared_episodes("test", 1)
-    message = rf"brains: expected at least one, each of sizes \(105, 8\).*got {came}"
+    message = rf"brains: expected sizes \(105, 8\) of observation and action, got {came}"
     with Runner(TASK, Noise(), Executor("serial"), training=False) as runner:
         with pytest.raises(ValueError, match=message):
             runner.run([acting] if isinstance(acting, Brain) else acting, [seeds])
@@ -246,7 +246,7 @@ def test_a_genome_of_neat_walks_the_same_over_gymnasium_and_neat_pythons_network
 
     env = gymnasium.make("Ant-v5", disable_env_checker=True)
     env.unwrapped.np_random = generator(seeds.world)
-    network = neat.nn.FeedForwardNetwork.create(team.genomes[0], config)
+    network = neat.nn.FeedForwardNetwork.create(to_stock(team.genomes[0]), config)
     observation, _ = env.reset()
     forward, steps, over = 0.0, 0, False
     while not over:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import yaml
 
-from exneat_cli.brains import Brain, assemble
-from exneat_cli.brains.brain import ACTIVATION_CODES
+from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.errors import ExneatError
+from exneat_cli.evolution import ACTIVATIONS
 from exneat_cli.records import HistoryRow, RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
@@ -192,22 +192,18 @@ def test_a_run_whose_first_write_fails_leaves_no_directory(tmp_path: Path, monke
     assert not tiny(tmp_path).directory.path.exists()
 
 
-def exploding(brain: Brain) -> Brain:
-    """NaN weights; identity activations, since neat-python's tanh clips NaN to a number."""
-    return brain._replace(
-        edge_weight=np.full_like(brain.edge_weight, np.nan),
-        activation=np.full_like(brain.activation, ACTIVATION_CODES["identity"]),
-    )
+def exploding(brains: Brains, every: int = 1) -> Brains:
+    """NaN biases in every so many brains; identity activations, since neat-python's tanh clips NaN to a number."""
+    bias, activation = brains.bias.copy(), brains.activation.copy()
+    for b in range(0, len(brains.size), every):
+        own = slice(brains.first_node[b], brains.first_node[b + 1])
+        bias[own] = np.nan
+        activation[own] = ACTIVATIONS.index("identity")
+    return brains._replace(bias=bias, activation=activation)
 
 
 def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = itertools.count()
-
-    def every_other_explodes(*arguments: Any, **options: Any) -> Brain:
-        brain = assemble(*arguments, **options)
-        return exploding(brain) if next(calls) % 2 == 0 else brain
-
-    monkeypatch.setattr(training_module, "assemble", every_other_explodes)
+    monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o), every=2))
     seen: list[HistoryRow] = []
     settings = tiny(tmp_path, population=10, generations=4)
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
@@ -237,7 +233,7 @@ def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) 
 def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(training_module, "assemble", lambda *a, **o: exploding(assemble(*a, **o)))
+    monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o)))
     with pytest.raises(ExneatError, match="no team ever finished"):
         train(tiny(tmp_path))
     manifest = tiny(tmp_path).directory.read_manifest()
