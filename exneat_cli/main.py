@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import listen
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -46,16 +47,8 @@ usage: exneat <command> [key=value ...]
 """
 
 
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM, which ends a run as cleanly as Ctrl-C does."""
-
-
-def _terminate(number: int, frame: object) -> None:
-    raise _Terminated
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 1 a job failed, 2 refused, 130 interrupted.
+    """Run one command; returns its exit code: 0 done, 1 a job failed, 2 refused, 130 or 143 interrupted.
 
     Args:
         arguments: without the program's name; None takes the process's own.
@@ -67,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if command in ("-V", "--version"):
         print(f"exneat {__version__}")
         return 0
-    signal.signal(signal.SIGTERM, _terminate)
+    listen()
     try:
         if command not in COMMANDS:
             raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
@@ -81,6 +74,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt as interrupt:
         print("exneat: interrupted; the same command goes on (exneat train needs resume=true for it)", file=sys.stderr)
-        return 143 if isinstance(interrupt, _Terminated) else 130
+        return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0

@@ -7,7 +7,8 @@ episodes grow from a constant instead of the run's seed: every run and every arm
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from numpy.random import PCG64, Generator, SeedSequence
 
@@ -73,3 +74,15 @@ def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
         EpisodeSeeds(*(stream(SHARED_ROOT, purpose, episode, kind) for kind in range(len(EpisodeSeeds._fields))))
         for episode in range(count)
     ]
+
+
+def generator_in(state: Mapping[str, Any]) -> Generator:
+    """A generator that goes on from the state of another, ``generator.bit_generator.state``.
+
+    Raises:
+        KeyError, OverflowError, TypeError, ValueError: it is no such state.
+    """
+    bit_generator = PCG64(0)
+    given: Any = dict(state)
+    bit_generator.state = given
+    return Generator(bit_generator)

@@ -10,7 +10,7 @@ import exneat_cli
 
 PACKAGE = Path(exneat_cli.__file__).parent
 ROOMS = ["tasks", "wiring", "evolution", "brains", "rollouts", "records", "runs", "analysis", "commands", "main"]
-FREE = {"errors", "seeding"}
+FREE = {"errors", "interruption", "seeding"}
 FENCES = {
     "hydra": {"main", "commands"},
     "omegaconf": {"main", "commands"},

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping
-from itertools import count
 from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from neat.genes import DefaultConnectionGene, DefaultNodeGene
@@ -17,6 +17,7 @@ from neat.genome import DefaultGenomeConfig
 from numpy.random import PCG64, Generator
 
 from exneat_cli.errors import ConfigError
+from exneat_cli.evolution.counter import Counter
 from exneat_cli.evolution.crossover import cross
 from exneat_cli.evolution.distance import genetic_distance
 from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE
@@ -31,6 +32,7 @@ from exneat_cli.evolution.structure import (
     without_node,
     would_close_a_cycle,
 )
+from exneat_cli.seeding import generator_in
 
 _FIXED = {
     "initial_connection": INITIAL_CONNECTIONS,
@@ -81,6 +83,15 @@ class ArrayGenomeConfig(DefaultGenomeConfig):  # type: ignore[misc]
             self._generator = Generator(PCG64(random.getrandbits(128)))
         return self._generator
 
+    @property
+    def generator_state(self) -> dict[str, Any] | None:
+        """Of the generator; None before its first use."""
+        return None if self._generator is None else dict(self._generator.bit_generator.state)
+
+    @generator_state.setter
+    def generator_state(self, state: dict[str, Any] | None) -> None:
+        self._generator = None if state is None else generator_in(state)
+
     def number(self, name: str) -> Number:
         """How the attribute ``weight``, ``bias`` or ``response`` begins and changes."""
         return Number(*_NUMBERS[name](self))
@@ -118,7 +129,7 @@ class ArrayGenome:
         """Make an initial genome."""
         rng = config.generator
         count_of_nodes = config.num_outputs + config.num_hidden
-        config.node_indexer = config.node_indexer or count(count_of_nodes)
+        config.node_indexer = config.node_indexer or Counter(count_of_nodes)
         self.nodes = np.zeros(count_of_nodes, NODE)
         self.nodes["key"] = np.arange(count_of_nodes)
         self.nodes["bias"] = _initial(config.number("bias"), count_of_nodes, rng)

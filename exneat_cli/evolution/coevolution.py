@@ -8,16 +8,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import neat
 from numpy.random import SeedSequence
 
 from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.packing import Columns, pack, unpack
 from exneat_cli.evolution.subpopulation import Subpopulation
-from exneat_cli.seeding import generator
+from exneat_cli.seeding import generator, generator_in
 
 PAIRINGS = ("rank", "index")
+
+
+class Snapshot(NamedTuple):
+    """A co-evolution between two generations.
+
+    Attributes:
+        plain: numbers, strings, lists and dicts.
+        genomes: of each subpopulation, packed.
+    """
+
+    plain: dict[str, Any]
+    genomes: list[Columns]
 
 
 class Team(NamedTuple):
@@ -58,6 +71,52 @@ class Coevolution:
         self._told: list[float] | None = None
         self.extinctions = 0
 
+    def snapshot(self) -> Snapshot:
+        """All that the next generation depends on; taking it changes nothing.
+
+        Raises:
+            RuntimeError: the teams that were asked for were not told their fitness.
+        """
+        if self._teams is None or self._told is None:
+            raise RuntimeError("snapshot: expected ask() and tell(fitness) before it")
+        plain = {
+            "subpopulations": [subpopulation.state() for subpopulation in self._subpopulations],
+            "pairing": dict(self._pairing_rng.bit_generator.state),
+            "teams": [list(team.ids) for team in self._teams],
+            "fitness": self._told,
+        }
+        return Snapshot(plain, [pack(list(each.genomes.values())) for each in self._subpopulations])
+
+    @classmethod
+    def restored(cls, configs: Sequence[neat.Config], snapshot: Snapshot, pairing: str = "rank") -> Coevolution:
+        """The co-evolution that `snapshot` was taken of.
+
+        Args:
+            configs: as new, and as they were.
+            snapshot: from `snapshot`, or from a file of anyone's.
+            pairing: as it was.
+
+        Raises:
+            AttributeError, KeyError, OverflowError, TypeError, ValueError: it is none, or does not fit.
+        """
+        plain = snapshot.plain
+        coevolution = cls.__new__(cls)
+        coevolution._subpopulations = [
+            Subpopulation.restored(config, state, unpack(columns, config.genome_type))
+            for config, state, columns in zip(configs, plain["subpopulations"], snapshot.genomes, strict=True)
+        ]
+        coevolution._pairing = pairing
+        coevolution._pairing_rng = generator_in(plain["pairing"])
+        coevolution._rank = [{} for _ in configs]
+        coevolution._teams = [coevolution._team(tuple(ids)) for ids in plain["teams"]]
+        coevolution._told = None
+        coevolution.extinctions = 0
+        for index, subpopulation in enumerate(coevolution._subpopulations):
+            if sorted(team.ids[index] for team in coevolution._teams) != sorted(subpopulation.genomes):
+                raise ValueError("expected every genome in one team")
+        coevolution.tell([float(value) for value in plain["fitness"]])
+        return coevolution
+
     @property
     def species_count(self) -> int:
         """Species of the current generation, summed over subpopulations."""
@@ -76,11 +135,11 @@ class Coevolution:
         if self._told is not None:
             self._advance()
         orders = [self._order(index) for index in range(len(self._subpopulations))]
-        self._teams = [
-            Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
-            for ids in zip(*orders, strict=True)
-        ]
+        self._teams = [self._team(ids) for ids in zip(*orders, strict=True)]
         return list(self._teams)
+
+    def _team(self, ids: tuple[int, ...]) -> Team:
+        return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
 
     def tell(self, fitness: Sequence[float]) -> None:
         """Give every team of the last `ask` its fitness, in the same order.

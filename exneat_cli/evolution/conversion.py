@@ -8,7 +8,7 @@ from neat.genes import DefaultConnectionGene, DefaultNodeGene
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution.array_genome import ArrayGenome
-from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE
+from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE, Connections, Nodes
 
 
 def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
@@ -19,13 +19,32 @@ def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
     """
     converted = ArrayGenome(genome.key)
     converted.fitness = genome.fitness
-    converted.nodes = np.array([_node_row(genome.nodes[key]) for key in sorted(genome.nodes)], NODE)
+    nodes, connections = tables_of(genome)
+    converted.nodes = np.sort(nodes, order="key")
+    converted.connections = np.sort(connections, order=["target", "source"])
+    return converted
+
+
+def to_stock(genome: ArrayGenome) -> neat.DefaultGenome:
+    """The same genome as neat-python's own, for its networks and tools."""
+    converted = stock_genome(genome.key, genome.nodes, genome.connections, neat.DefaultGenome)
+    converted.fitness = genome.fitness
+    return converted
+
+
+def tables_of(genome: ArrayGenome | neat.DefaultGenome) -> tuple[Nodes, Connections]:
+    """Nodes and connections in the genome's own order.
+
+    Raises:
+        ExneatError: a node has an activation, aggregation or time constant that arrays do not hold.
+    """
+    if isinstance(genome, ArrayGenome):
+        return genome.nodes, genome.connections
     rows = [
         (target, source, gene.innovation, gene.weight, gene.enabled)
         for (source, target), gene in genome.connections.items()
     ]
-    converted.connections = np.array(sorted(rows), CONNECTION)
-    return converted
+    return np.array([_node_row(node) for node in genome.nodes.values()], NODE), np.array(rows, CONNECTION)
 
 
 def _node_row(gene: DefaultNodeGene) -> tuple[int, float, float, int]:
@@ -39,17 +58,18 @@ def _node_row(gene: DefaultNodeGene) -> tuple[int, float, float, int]:
     return gene.key, gene.bias, gene.response, ACTIVATIONS.index(gene.activation)
 
 
-def to_stock(genome: ArrayGenome) -> neat.DefaultGenome:
-    """The same genome as neat-python's own, for its networks and tools."""
-    converted = neat.DefaultGenome(genome.key)
-    converted.fitness = genome.fitness
-    for key, bias, response, activation in genome.nodes.tolist():
-        node = DefaultNodeGene(key)
+def stock_genome(
+    key: int, nodes: Nodes, connections: Connections, kind: type[neat.DefaultGenome]
+) -> neat.DefaultGenome:
+    """A genome of neat-python's, or of a class that extends it, with these genes in this order."""
+    genome = kind(key)
+    for node_key, bias, response, activation in nodes.tolist():
+        node = DefaultNodeGene(node_key)
         node.bias, node.response, node.activation = bias, response, ACTIVATIONS[activation]
         node.aggregation, node.time_constant = "sum", 1.0
-        converted.nodes[key] = node
-    for target, source, innovation, weight, enabled in genome.connections.tolist():
+        genome.nodes[node_key] = node
+    for target, source, innovation, weight, enabled in connections.tolist():
         gene = DefaultConnectionGene((source, target), innovation=innovation)
         gene.weight, gene.enabled = weight, enabled
-        converted.connections[source, target] = gene
-    return converted
+        genome.connections[source, target] = gene
+    return genome

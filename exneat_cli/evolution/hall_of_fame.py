@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from exneat_cli.evolution.coevolution import Team
@@ -20,10 +21,14 @@ class Entry(NamedTuple):
 
 
 class HallOfFame:
-    """At most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes."""
+    """At most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes.
 
-    def __init__(self) -> None:
-        self._entries: dict[tuple[int, ...], Entry] = {}
+    Args:
+        entries: of a hall of fame that this one goes on from, best first.
+    """
+
+    def __init__(self, entries: Sequence[Entry] = ()) -> None:
+        self._entries = {entry.team.ids: entry for entry in entries}
 
     @property
     def entries(self) -> list[Entry]:

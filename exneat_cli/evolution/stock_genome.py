@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import count
-
 import neat
 from neat.genome import DefaultGenomeConfig
+
+from exneat_cli.evolution.counter import Counter
 
 
 class HomologousGenome(neat.DefaultGenome):  # type: ignore[misc]
@@ -18,8 +18,8 @@ class HomologousGenome(neat.DefaultGenome):  # type: ignore[misc]
     def configure_new(self, config: DefaultGenomeConfig) -> None:
         """Make an initial genome; nodes that mutations add later still get ids of their own."""
         first_hidden = config.num_outputs
-        later_nodes = config.node_indexer or count(first_hidden + config.num_hidden)
-        config.node_indexer = count(first_hidden)
+        later_nodes = config.node_indexer or Counter(first_hidden + config.num_hidden)
+        config.node_indexer = Counter(first_hidden)
         super().configure_new(config)
         config.node_indexer = later_nodes
         if config.positive_start:

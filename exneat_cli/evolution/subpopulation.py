@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import random
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import neat
 from neat.reporting import ReporterSet
+from neat.species import Species
 from numpy.random import SeedSequence
 
 from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.conversion import from_stock
+from exneat_cli.evolution.counter import Counter
 
 _GLOBAL_RANDOM_STATE = threading.Lock()
 """Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
@@ -35,16 +37,21 @@ class Subpopulation:
     """
 
     def __init__(self, config: neat.Config, seed: SeedSequence) -> None:
-        self.config = config
+        self._equip(config)
         self._random_state = random.Random(int.from_bytes(seed.generate_state(8).tobytes(), "little")).getstate()
-        reporters = ReporterSet()
-        stagnation = config.stagnation_type(config.stagnation_config, reporters)
-        self._reproduction = config.reproduction_type(config.reproduction_config, reporters, stagnation)
-        self._species = config.species_set_type(config.species_set_config, reporters)
         self._generation = 0
         with self._own_random_state():
             self.genomes: dict[int, Any] = self._create()
             self._species.speciate(config, self.genomes, self._generation)
+
+    def _equip(self, config: neat.Config) -> None:
+        self.config = config
+        reporters = ReporterSet()
+        stagnation = config.stagnation_type(config.stagnation_config, reporters)
+        self._reproduction = config.reproduction_type(config.reproduction_config, reporters, stagnation)
+        self._reproduction.genome_indexer = Counter(1)
+        self._species = config.species_set_type(config.species_set_config, reporters)
+        self._species.indexer = Counter(1)
 
     @property
     def species_count(self) -> int:
@@ -72,8 +79,82 @@ class Subpopulation:
             if extinct:
                 self.genomes = self._create()
             self._species.speciate(self.config, self.genomes, self._generation)
+        # neat-python keeps every genome's parents for ever, and asks for none of them.
+        self._reproduction.ancestors.clear()
         self._generation += 1
         return extinct
+
+    def state(self) -> dict[str, Any]:
+        """All but the genomes, as numbers, strings, lists and dicts; changes nothing."""
+        version, words, next_gauss = self._random_state
+        return {
+            "generation": self._generation,
+            "random": [version, list(words), next_gauss],
+            "generator": getattr(self.config.genome_config, "generator_state", None),
+            "next_genome": self._reproduction.genome_indexer.following,
+            "next_species": self._species.indexer.following,
+            "next_node": self.config.genome_config.node_indexer.following,
+            "last_innovation": self._reproduction.innovation_tracker.global_counter,
+            "species": [
+                {
+                    "id": species.key,
+                    "created": species.created,
+                    "last_improved": species.last_improved,
+                    "fitness_history": list(species.fitness_history),
+                    "representative": species.representative.key,
+                    "members": list(species.members),
+                }
+                for species in self._species.species.values()
+            ],
+        }
+
+    @classmethod
+    def restored(cls, config: neat.Config, state: Mapping[str, Any], genomes: Sequence[Any]) -> Subpopulation:
+        """The subpopulation whose `state` this was, with these genomes in this order.
+
+        Args:
+            config: as new.
+            state: from `state`, or from a file of anyone's.
+            genomes: of the configuration's class.
+
+        Raises:
+            AttributeError, KeyError, OverflowError, TypeError, ValueError: the state is none, or does not fit.
+        """
+        subpopulation = cls.__new__(cls)
+        subpopulation._equip(config)
+        if len(genomes) != config.pop_size:
+            raise ValueError(f"expected {config.pop_size} genomes, got {len(genomes)}")
+        subpopulation.genomes = {genome.key: genome for genome in genomes}
+        subpopulation._generation = int(state["generation"])
+        version, words, next_gauss = state["random"]
+        chance = random.Random()
+        chance.setstate((int(version), tuple(words), None if next_gauss is None else float(next_gauss)))
+        subpopulation._random_state = chance.getstate()
+        genome_config = config.genome_config
+        genome_config.innovation_tracker = subpopulation._reproduction.innovation_tracker
+        genome_config.innovation_tracker.global_counter = int(state["last_innovation"])
+        genome_config.node_indexer = Counter(int(state["next_node"]))
+        if state["generator"] is not None:
+            genome_config.generator_state = state["generator"]
+        subpopulation._reproduction.genome_indexer = Counter(int(state["next_genome"]))
+        subpopulation._species.indexer = Counter(int(state["next_species"]))
+        subpopulation._restore_species(state["species"])
+        return subpopulation
+
+    def _restore_species(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        for entry in entries:
+            species = Species(int(entry["id"]), int(entry["created"]))
+            species.last_improved = int(entry["last_improved"])
+            species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
+            members = {int(key): self.genomes[int(key)] for key in entry["members"]}
+            species.update(self.genomes[int(entry["representative"])], members)
+            self._species.species[species.key] = species
+        placed = sorted(key for species in self._species.species.values() for key in species.members)
+        if placed != sorted(self.genomes):
+            raise ValueError("expected every genome in one species")
+        self._species.genome_to_species = {
+            key: species.key for species in self._species.species.values() for key in species.members
+        }
 
     def _create(self) -> dict[int, Any]:
         genomes: dict[int, Any] = self._reproduction.create_new(

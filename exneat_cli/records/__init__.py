@@ -2,14 +2,18 @@
 
 from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, read_json, read_yaml, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
+from exneat_cli.records.locks import is_held
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
     DONE,
     FAILED,
     INTERRUPTED,
+    MANIFEST_FORMAT,
     RUNNING,
+    Claim,
     RunDirectory,
     configuration_hash,
     find_runs,
@@ -19,23 +23,29 @@ __all__ = [
     "DONE",
     "FAILED",
     "INTERRUPTED",
+    "MANIFEST_FORMAT",
     "RUNNING",
     "UNPERTURBED",
     "Champion",
+    "Checkpoint",
+    "Claim",
     "HistoryRow",
     "RobustnessRow",
     "RunDirectory",
     "configuration_hash",
     "find_runs",
+    "is_held",
     "make_directory",
     "merge_robustness",
     "plan_from_data",
     "provenance",
     "read_champion",
+    "read_checkpoints",
     "read_json",
     "read_robustness",
     "read_yaml",
     "write_champion",
+    "write_checkpoint",
     "write_csv",
     "write_hall_of_fame",
     "write_history",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -13,6 +14,7 @@ from typing import Any
 import yaml
 
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import finishing
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -23,15 +25,22 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     data = content.encode("utf-8") if isinstance(content, str) else content
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+    with finishing():
+        try:
+            with temporary.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except OSError as error:
+            delete(temporary)
+            raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+
+
+def delete(path: Path) -> None:
+    """Delete a file that may be there; one that cannot be deleted stays."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 def make_directory(path: Path) -> None:

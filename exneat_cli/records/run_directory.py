@@ -3,36 +3,59 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
+import enum
 import hashlib
 import json
-import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import read_json, write_json, write_whole
+from exneat_cli.records.files import delete, read_json, read_yaml, write_json, write_whole
+from exneat_cli.records.locks import held
 
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
 """What a manifest's status can be."""
 
-_WITHOUT_EFFECT = ("executor", "output", "name", "resume")
+MANIFEST_FORMAT = 2
+
+_WITHOUT_EFFECT = ("executor", "output", "name", "resume", "checkpoint_every")
 """Settings that say where and how to run, not what comes out."""
+_NOT_HASHED = (*_WITHOUT_EFFECT, "generations")
+"""A run may be made longer, so its length is no part of what it is."""
 
 
-def configuration_hash(configuration: dict[str, Any], *, with_seed: bool = True) -> str:
-    """SHA-256, in hex, of the settings that results depend on.
+class Claim(enum.Enum):
+    """What is to be done in a run directory."""
+
+    BEGIN = "begin"
+    CONTINUE = "continue"
+    FINISHED = "finished"
+
+
+def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
+    """SHA-256, in hex, of the settings that results depend on, but for the number of generations.
 
     Args:
         configuration: all settings of a run, as plain data.
         with_seed: without it, the seeds of one arm share a hash.
     """
-    ignored = _WITHOUT_EFFECT if with_seed else (*_WITHOUT_EFFECT, "seed")
-    kept = {key: _canonical(value) for key, value in configuration.items() if key not in ignored}
+    kept = _that_matter(configuration, _NOT_HASHED if with_seed else (*_NOT_HASHED, "seed"))
     return hashlib.sha256(json.dumps(kept, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _that_matter(configuration: Mapping[str, Any], ignored: Sequence[str]) -> dict[str, Any]:
+    return {key: _canonical(value) for key, value in configuration.items() if key not in ignored}
+
+
+def _flat(plain: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """The same with dotted keys."""
+    flat: dict[str, Any] = {}
+    for key, value in plain.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return flat
 
 
 def _canonical(value: Any) -> Any:
@@ -96,96 +119,105 @@ class RunDirectory:
         return self.path / "plots"
 
     @contextlib.contextmanager
-    def claimed(self, full_hash: str, *, resume: bool) -> Iterator[bool]:
+    def claimed(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool) -> Iterator[Claim]:
         """Hold the directory, made if need be, against other processes.
 
+        Args:
+            full_hash: of the run, see `configuration_hash`.
+            configuration: all its settings, as plain data.
+            resume: whether to go on with an unfinished run, or to make a finished one longer.
+
         Yields:
-            True if the run is to be done, False if it is finished already.
+            What is to be done there.
 
         Raises:
-            ExneatError: the directory cannot be made or used, or holds something else than this run finished.
+            ExneatError: the directory cannot be made or used, or holds something else than this run.
         """
-        is_new = self._make()
+        self._make()
         with self.held():
-            yield is_new or self._is_to_be_done(full_hash, resume)
+            yield self._claim(full_hash, configuration, resume)
 
-    def _make(self) -> bool:
+    def _make(self) -> None:
         try:
-            self.path.mkdir(parents=True)
+            self.path.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
-            if self.path.is_dir():
-                return False
             raise ExneatError(f"{self.path}: expected a directory, got a file; set name= or output=") from None
         except OSError as error:
             raise ExneatError(
                 f"{self.path}: the run directory cannot be made: {error.strerror}\n"
                 "  set output= to a directory that you can write to"
             ) from error
-        return True
 
-    @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
+    def held(self) -> contextlib.AbstractContextManager[None]:
         """Hold the directory against other processes.
 
         Raises:
-            ExneatError: another process holds it, or it cannot be opened.
+            ExneatError: when entered, if another process holds it, or it cannot be opened.
         """
-        # The lock is on the directory itself: nothing is left behind, and a killed process frees it.
-        try:
-            descriptor = os.open(self.path, os.O_RDONLY)
-        except OSError as error:
-            raise ExneatError(f"{self.path}: cannot be opened: {error.strerror}") from error
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                process = self.read_manifest().get("process", "unknown") if self.manifest.exists() else "unknown"
-                raise ExneatError(f"{self.path}: another process is writing this run (process id {process})") from None
-            yield
-        finally:
-            os.close(descriptor)
+        return held(self.path)
 
-    def _is_to_be_done(self, full_hash: str, resume: bool) -> bool:
+    def _claim(self, full_hash: str, configuration: Mapping[str, Any], resume: bool) -> Claim:
         if not self.manifest.exists():
-            if resume and self._holds_nothing():
-                return True
+            if self._holds_nothing():
+                return Claim.BEGIN
             raise ExneatError(
-                f"{self.path}: expected a new directory or a finished run, got one without manifest.json\n"
+                f"{self.path}: expected a new directory or a run, got one without manifest.json\n"
                 "  remove it, or set name= or output= to another place"
             )
         manifest = self.read_manifest()
+        mend = "  remove it, or set name= or output= to another place"
+        if manifest.get("format") != MANIFEST_FORMAT:
+            came = f"holds a run of format {manifest.get('format')!r}, expected {MANIFEST_FORMAT}"
+            raise ExneatError(f"{self.path}: {came}\n{mend}")
         if manifest.get("configuration_hash") != full_hash:
+            raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{mend}")
+        status, there, asked = manifest.get("status"), manifest.get("generations"), configuration["generations"]
+        if status == DONE and there == asked:
+            return Claim.FINISHED
+        if not isinstance(there, int) or asked < there:
             raise ExneatError(
-                f"{self.path}: holds a run with another configuration or of another version\n"
-                "  remove it, or set name= or output= to another place"
+                f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
+                "  generations= can only be raised; set name= to another folder for a shorter run"
             )
-        if manifest.get("status") == DONE:
-            return False
         if not resume:
-            raise ExneatError(
-                f"{self.path}: holds an unfinished run (status {manifest.get('status')})\n"
-                "  add resume=true to do it again from its first generation, with the same results"
-            )
-        return True
+            holds = f"a finished run of {there} generations" if status == DONE else f"an unfinished run ({status})"
+            raise ExneatError(f"{self.path}: holds {holds}\n  add resume=true to go on from where it stopped")
+        return Claim.CONTINUE
+
+    def _difference(self, configuration: Mapping[str, Any]) -> str:
+        """What the run that is there has otherwise, in words."""
+        try:
+            there = _flat(_that_matter(read_yaml(self.config), _NOT_HASHED))
+        except ExneatError:
+            return "its config.yaml cannot be read"
+        asked = _flat(_that_matter(configuration, _NOT_HASHED))
+        keys = [key for key in sorted({*there, *asked}) if there.get(key) != asked.get(key)]
+        named = [f"{key} is {there.get(key, 'unset')} there, {asked.get(key, 'unset')} here" for key in keys[:3]]
+        return "; ".join(named) + ("; ..." if len(keys) > 3 else "") if keys else "its manifest is of another one"
 
     def _holds_nothing(self) -> bool:
-        """Whether a run that was killed before its manifest was written left this directory."""
-        return all(path.name == self.config.name or path.suffix == ".tmp" for path in self.path.iterdir())
+        """Whether the directory is new, or left by a run that was killed before its manifest was written."""
+        return all(path.suffix == ".tmp" for path in self.path.iterdir())
 
     def begin(self, config: str, manifest: dict[str, object]) -> None:
-        """Write the first two files, the manifest last; if that fails, a directory that was new is gone again.
+        """Write the first two files, the manifest first; if that fails, a directory that was new is gone again.
 
         Raises:
             ExneatError: they cannot be written.
         """
         is_new = not any(self.path.iterdir())
         try:
-            write_whole(self.config, config)
             write_json(self.manifest, manifest)
+            write_whole(self.config, config)
         except ExneatError:
             if is_new:
                 shutil.rmtree(self.path, ignore_errors=True)
             raise
+
+    def forget_what_was_derived(self) -> None:
+        """Delete robustness and figures, which belong to a champion and a history that are about to change."""
+        delete(self.robustness)
+        shutil.rmtree(self.plots, ignore_errors=True)
 
     def is_there(self) -> bool:
         """Whether the directory holds a run, as far as one can see."""

@@ -84,7 +84,7 @@ def _episodes(  # type: ignore[no-untyped-def]
         conditions: what happens to inputs and actions on their way.
         buffers: to write into.
         observation_size: entries of the observation.
-        halt: (1,), set by another thread to stop before the next brain.
+        halt: (1,), set by another thread to stop.
         status: (B,), overwritten with how the episodes ended.
         steps: (B,), overwritten with how many steps they took.
         totals: (B, terms), overwritten with the sums of the reward terms.
@@ -98,8 +98,6 @@ def _episodes(  # type: ignore[no-untyped-def]
     observation = memory[:observation_size]
     reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
     for b in range(first, last):
-        if halt[0]:
-            return
         if b > first:
             restart(world)  # type: ignore[name-defined]  # noqa: F821
         memory[:] = 0.0
@@ -109,6 +107,8 @@ def _episodes(  # type: ignore[no-untyped-def]
         t = 0
         ended = RUNNING
         while ended == RUNNING:
+            if halt[0]:
+                return
             if t == drawn:
                 _draw(conditions, sensor_noise[t], action_noise[t], noise_rng, action_rng)
                 drawn += 1

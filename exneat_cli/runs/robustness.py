@@ -10,10 +10,17 @@ from collections.abc import Sequence
 
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champion, read_robustness, read_yaml
+from exneat_cli.records import (
+    DONE,
+    MANIFEST_FORMAT,
+    RunDirectory,
+    merge_robustness,
+    read_champion,
+    read_robustness,
+    read_yaml,
+)
 from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.run import MANIFEST_FORMAT
 from exneat_cli.runs.scores import baseline, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.wiring import UNTRAINED
@@ -35,7 +42,8 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         mend = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {mend}")
     settings = RunSettings.from_plain(read_yaml(directory.config))
-    if settings.full_hash != manifest.get("configuration_hash"):
+    described = {"configuration_hash": settings.full_hash, "generations": settings.generations}
+    if any(manifest.get(key) != value for key, value in described.items()):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
 
@@ -46,7 +54,13 @@ def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -
     if not directory.is_there():
         return False
     manifest = directory.read_manifest()
-    if manifest.get("status") != DONE or manifest.get("configuration_hash") != settings.full_hash:
+    wanted = {
+        "format": MANIFEST_FORMAT,
+        "status": DONE,
+        "configuration_hash": settings.full_hash,
+        "generations": settings.generations,
+    }
+    if any(manifest.get(key) != value for key, value in wanted.items()):
         return False
     return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -12,19 +13,25 @@ import numpy as np
 import yaml
 
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
+from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Team
 from exneat_cli.records import (
     DONE,
     FAILED,
     INTERRUPTED,
+    MANIFEST_FORMAT,
     RUNNING,
     UNPERTURBED,
     Champion,
+    Checkpoint,
+    Claim,
     HistoryRow,
     RunDirectory,
     merge_robustness,
     provenance,
+    read_checkpoints,
     write_champion,
+    write_checkpoint,
     write_csv,
     write_hall_of_fame,
     write_history,
@@ -36,8 +43,6 @@ from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
 from exneat_cli.wiring import UNTRAINED
-
-MANIFEST_FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -69,26 +74,43 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     directory = settings.directory
-    with directory.claimed(settings.full_hash, resume=settings.resume) as to_be_done:
-        if to_be_done:
+    with directory.claimed(settings.full_hash, settings.to_plain(), resume=settings.resume) as claim:
+        if claim is not Claim.FINISHED:
             _train_in(directory, settings, progress or Silence(), command)
         result = directory.read_manifest()["result"]
-    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=to_be_done)
+    trained_now = claim is not Claim.FINISHED
+    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=trained_now)
 
 
 def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]) -> None:
-    directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), _first_manifest(settings, command))
+    before = directory.read_manifest() if directory.is_there() else {}
+    manifest = _first_manifest(settings, command)
+    if before:
+        _tell_other_versions(before, progress)
+        manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
+    if before.get("status") == DONE:
+        directory.forget_what_was_derived()
+    directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
     try:
         result = _do(settings, directory, progress)
     except KeyboardInterrupt:
         directory.update_manifest(status=INTERRUPTED)
         raise
     except BaseException as error:
-        directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+        with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
         raise
     finally:
         progress.stop()
     directory.update_manifest(status=DONE, finished=_now(), result=result)
+
+
+def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:
+    now, then = provenance.versions(), dict(before.get("versions") or {})
+    changed = [name for name in now if then.get(name) != now[name]]
+    if changed:
+        names = ", ".join(f"{name} {then.get(name)} then, {now[name]} now" for name in changed)
+        progress.say(f"{names}: results may differ from those of an undisturbed run")
 
 
 def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, object]:
@@ -100,6 +122,7 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
         "task": settings.task.name,
         "seed": settings.seed,
         "configuration_hash": settings.full_hash,
+        "generations": settings.generations,
         "command": list(command),
         "started": _now(),
         "seeds": {"root": settings.seed, "streams": STREAMS},
@@ -120,8 +143,12 @@ def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> d
         write_history(directory.history, history)
         progress.generation(history[-1])
 
+    def save(checkpoint: Checkpoint) -> None:
+        write_checkpoint(directory.path, checkpoint, settings.full_hash)
+
+    checkpoints = read_checkpoints(directory.path, settings.full_hash)
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        trained = evolve(settings, runner, report)
+        trained = evolve(settings, runner, report, checkpoints=checkpoints, say=progress.say, save=save)
     last = trained.history[-1]
     spent = {"episodes": last.episodes, "env_steps": last.env_steps, "wall_seconds": last.wall_seconds}
     directory.update_manifest(budget_spent=spent)

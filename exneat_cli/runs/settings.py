@@ -41,7 +41,8 @@ class RunSettings:
         test_episodes: per brain that is tested.
         name: directory below `output`; None takes the task's name.
         output: root of all run directories.
-        resume: do an unfinished run again.
+        resume: go on with an unfinished run, or make a finished one longer.
+        checkpoint_every: generations from one checkpoint to the next.
 
     Raises:
         ConfigError: a value is out of range, or the combination makes no sense.
@@ -65,6 +66,7 @@ class RunSettings:
     name: str | None = None
     output: str = "outputs"
     resume: bool = False
+    checkpoint_every: int = 1
 
     def __post_init__(self) -> None:
         if self.evolution is None:
@@ -77,6 +79,7 @@ class RunSettings:
         check_whole("validation_episodes", self.validation_episodes, 1)
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
+        check_whole("checkpoint_every", self.checkpoint_every, 1)
         if not isinstance(self.output, str) or not self.output or "\0" in self.output:
             raise ConfigError("output", "a directory", self.output)
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
@@ -111,7 +114,7 @@ class RunSettings:
 
     @property
     def full_hash(self) -> str:
-        """Hash of everything that results depend on."""
+        """Hash of everything that results depend on, but for the number of generations."""
         return configuration_hash(self._identity())
 
     def _identity(self) -> dict[str, Any]:

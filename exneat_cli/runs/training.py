@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from exneat_cli.brains import assemble_all
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, neat_config
-from exneat_cli.records import HistoryRow
+from exneat_cli.records import Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.runs.saved_training import SavedTraining
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import stream, training_episodes
 
@@ -33,25 +35,56 @@ class Trained:
     history: list[HistoryRow]
 
 
-def evolve(settings: RunSettings, runner: Runner, report: Callable[[list[HistoryRow]], None]) -> Trained:
+def evolve(
+    settings: RunSettings,
+    runner: Runner,
+    report: Callable[[list[HistoryRow]], None],
+    *,
+    checkpoints: Iterable[Checkpoint | str] = (),
+    say: Callable[[str], None] = lambda _: None,
+    save: Callable[[Checkpoint], None] | None = None,
+) -> Trained:
     """Train one arm.
 
     Args:
         settings: of the run.
         runner: runs training episodes.
         report: called with all rows so far after each generation.
+        checkpoints: the newest first, with a line in place of each that cannot be read; training goes on from the
+            first one that is sound, else from the beginning, with the same results.
+        say: told what it goes on from.
+        save: called with a checkpoint every `settings.checkpoint_every` generations, and after the last.
 
     Raises:
         ExneatError: not a single team ever finished its episodes.
     """
-    training = _Training(settings, runner)
-    for _ in range(settings.generations):
+    training = _begin_or_go_on(settings, runner, checkpoints, say)
+    while (done := len(training.history)) < settings.generations:
         training.advance()
         report(training.history)
+        if save is not None and ((done + 1) % settings.checkpoint_every == 0 or done + 1 == settings.generations):
+            save(training.checkpoint())
     if not training.hall_of_fame.entries:
         raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
     assert training.first_generation is not None
     return Trained(training.hall_of_fame.entries, training.first_generation, training.history)
+
+
+def _begin_or_go_on(
+    settings: RunSettings, runner: Runner, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
+) -> _Training:
+    for checkpoint in checkpoints:
+        if isinstance(checkpoint, str):
+            say(checkpoint)
+            continue
+        try:
+            training = _Training.restored(settings, runner, checkpoint)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
+        else:
+            say(f"going on after generation {checkpoint.generation}")
+            return training
+    return _Training(settings, runner)
 
 
 def _failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
@@ -63,6 +96,11 @@ def _failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
     return [value if k in passed else min(value, behind) for k, value in enumerate(fitness)]
 
 
+def _configs(settings: RunSettings) -> list[Any]:
+    shapes = settings.plan.subpopulation_shapes
+    return [neat_config(settings.evolution, settings.population, shape) for shape in shapes]
+
+
 class _Training:
     """The state that a generation hands to the next."""
 
@@ -70,10 +108,10 @@ class _Training:
         self._settings = settings
         self._runner = runner
         self._plan = settings.plan
-        shapes = self._plan.subpopulation_shapes
+        configs = _configs(settings)
         self._coevolution = Coevolution(
-            [neat_config(settings.evolution, settings.population, shape) for shape in shapes],
-            [stream(settings.seed, "evolution", index) for index in range(len(shapes))],
+            configs,
+            [stream(settings.seed, "evolution", index) for index in range(len(configs))],
             stream(settings.seed, "pairing"),
             settings.pairing,
         )
@@ -81,6 +119,30 @@ class _Training:
         self.hall_of_fame = HallOfFame()
         self.history: list[HistoryRow] = []
         self.first_generation: Team | None = None
+
+    @classmethod
+    def restored(cls, settings: RunSettings, runner: Runner, checkpoint: Checkpoint) -> _Training:
+        """The training that `checkpoint` was taken of, or one that goes on just as it would have."""
+        configs = _configs(settings)
+        saved = SavedTraining.read(checkpoint, len(configs))
+        if not 1 <= len(saved.history) == checkpoint.generation <= settings.generations:
+            raise ValueError(f"expected at most {settings.generations} generations, got {len(saved.history)}")
+        training = cls.__new__(cls)
+        training._settings, training._runner, training._plan = settings, runner, settings.plan
+        training._coevolution = Coevolution.restored(configs, saved.coevolution, settings.pairing)
+        training.hall_of_fame = HallOfFame(saved.hall_of_fame)
+        training.history = saved.history
+        training.first_generation = saved.first_generation
+        training._began = time.perf_counter() - saved.history[-1].wall_seconds
+        return training
+
+    def checkpoint(self) -> Checkpoint:
+        """What `restored` needs; taking it changes nothing."""
+        assert self.first_generation is not None
+        saved = SavedTraining(
+            self._coevolution.snapshot(), self.hall_of_fame.entries, self.first_generation, self.history
+        )
+        return saved.as_checkpoint()
 
     def advance(self) -> None:
         """Evaluate and record one generation."""

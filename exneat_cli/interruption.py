@@ -1,0 +1,93 @@
+"""Ctrl-C and SIGTERM: a write in hand is finished first, then everything ends within seconds."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+PATIENCE = 4.0
+"""Seconds after which a process that was asked to end is ended."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Raised in the main thread when the process is asked to end.
+
+    Attributes:
+        number: of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+class _Heard:
+    """What is known of signals so far; handlers run in the main thread alone."""
+
+    first: int | None = None
+    waiting: int | None = None
+    writes_in_hand = 0
+
+
+def listen() -> None:
+    """Turn Ctrl-C and SIGTERM into `Interrupted` from now on; a second one ends the process at once.
+
+    A process that is still there after `PATIENCE` is ended too, with what it started: libraries may swallow
+    an exception that comes from a signal.
+    """
+    _Heard.first = _Heard.waiting = None
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _hear)
+
+
+@contextlib.contextmanager
+def finishing() -> Iterator[None]:
+    """Put `Interrupted` off until the block is done, if this is the main thread.
+
+    Raises:
+        Interrupted: at the end of the block, if a signal came meanwhile.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _Heard.writes_in_hand += 1
+    try:
+        yield
+    finally:
+        _Heard.writes_in_hand -= 1
+        if _Heard.waiting is not None and _Heard.writes_in_hand == 0:
+            number, _Heard.waiting = _Heard.waiting, None
+            raise Interrupted(number)
+
+
+def _hear(number: int, frame: object) -> None:
+    if _Heard.first is not None:
+        _end(number)
+    _Heard.first = number
+    watch = threading.Timer(PATIENCE, _end, (number,))
+    watch.daemon = True
+    watch.start()
+    if _Heard.writes_in_hand:
+        _Heard.waiting = number
+    else:
+        raise Interrupted(number)
+
+
+def _end(number: int) -> None:
+    for process in _descendants(os.getpid()):
+        with contextlib.suppress(OSError):
+            os.kill(process, signal.SIGKILL)
+    os._exit(128 + number)
+
+
+def _descendants(process: int) -> Iterator[int]:
+    """Ids of all processes that this one started, and of those that they did; none where /proc is missing."""
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            for child in path.read_text(encoding="ascii").split():
+                yield from _descendants(int(child))
+                yield int(child)

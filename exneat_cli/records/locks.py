@@ -1,0 +1,68 @@
+"""One writer per directory."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from exneat_cli.errors import ExneatError
+
+_KERNEL_LOCKS = Path("/proc/locks")
+
+
+@contextlib.contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Hold a directory against other processes, and other threads of this one.
+
+    The lock is on the directory itself: nothing is left behind, and a killed process frees it.
+
+    Raises:
+        ExneatError: another process holds it, or it cannot be opened.
+    """
+    try:
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise ExneatError(f"{directory}: cannot be opened: {error.strerror}") from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            process = _holder(descriptor) or "unknown"
+            raise ExneatError(f"{directory}: another process is writing there (process id {process})") from None
+        if not _is_still(directory, descriptor):
+            raise ExneatError(f"{directory}: was removed by another process at this moment; try again")
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def is_held(directory: Path) -> bool:
+    """Whether a process holds the directory now."""
+    try:
+        with held(directory):
+            return False
+    except ExneatError:
+        return True
+
+
+def _is_still(directory: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.stat(directory), os.fstat(descriptor))
+    except OSError:
+        return False
+
+
+def _holder(descriptor: int) -> int | None:
+    """Id of the process that holds the lock; None where the kernel does not tell."""
+    inode = os.fstat(descriptor).st_ino
+    try:
+        lines = _KERNEL_LOCKS.read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    for fields in (line.split() for line in lines):
+        if "FLOCK" in fields and "->" not in fields and fields[-3].endswith(f":{inode}"):
+            return int(fields[-4])
+    return None
