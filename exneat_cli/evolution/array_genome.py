@@ -88,9 +88,9 @@ class ArrayGenomeConfig(DefaultGenomeConfig):  # type: ignore[misc]
         """Of the generator; None before its first use."""
         return None if self._generator is None else dict(self._generator.bit_generator.state)
 
-    @generator_state.setter
-    def generator_state(self, state: dict[str, Any] | None) -> None:
-        self._generator = None if state is None else generator_in(state)
+    def go_on_from(self, generator_state: Mapping[str, Any]) -> None:
+        """Draw what a generator in this state would draw next."""
+        self._generator = generator_in(generator_state)
 
     def number(self, name: str) -> Number:
         """How the attribute ``weight``, ``bias`` or ``response`` begins and changes."""

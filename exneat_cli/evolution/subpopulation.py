@@ -135,7 +135,7 @@ class Subpopulation:
         genome_config.innovation_tracker.global_counter = int(state["last_innovation"])
         genome_config.node_indexer = Counter(int(state["next_node"]))
         if state["generator"] is not None:
-            genome_config.generator_state = state["generator"]
+            genome_config.go_on_from(state["generator"])
         subpopulation._reproduction.genome_indexer = Counter(int(state["next_genome"]))
         subpopulation._species.indexer = Counter(int(state["next_species"]))
         subpopulation._restore_species(state["species"])

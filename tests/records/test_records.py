@@ -6,16 +6,22 @@ import csv
 import itertools
 import json
 import math
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import (
+    MANIFEST_FORMAT,
+    Claim,
     HistoryRow,
     RunDirectory,
     configuration_hash,
     find_runs,
+    is_held,
     read_champion,
     read_json,
     write_csv,
@@ -86,30 +92,52 @@ def test_the_hash_ignores_where_and_how_but_not_what() -> None:
     assert configuration_hash(base) != configuration_hash({**base, "task": {"name": "maze"}})
 
 
-def claim(run: RunDirectory, full_hash: str, *, resume: bool = False) -> bool:
-    with run.claimed(full_hash, resume=resume) as to_be_done:
-        return to_be_done
+SETTINGS = {"generations": 5, "seed": 0, "task": {"name": "ant", "patience": 100}}
+
+
+def claim(run: RunDirectory, full_hash: str, *, resume: bool = False, **changes: Any) -> Claim:
+    with run.claimed(full_hash, {**SETTINGS, **changes}, resume=resume) as claim:
+        return claim
 
 
 def started(path: Path, status: str, full_hash: str = "hash") -> RunDirectory:
     run = RunDirectory(path)
-    assert claim(run, full_hash) is True
-    run.begin("seed: 0\n", {"configuration_hash": full_hash, "status": status, "process": 12345})
+    assert claim(run, full_hash) is Claim.BEGIN
+    head = {"format": MANIFEST_FORMAT, "configuration_hash": full_hash, "generations": 5}
+    run.begin(yaml.safe_dump(SETTINGS), {**head, "status": status, "process": 12345})
     return run
 
 
 def test_a_new_directory_is_claimed_and_a_finished_run_is_found(tmp_path: Path) -> None:
     run = started(tmp_path / "ant" / "neat-s0-abcdef", "done")
-    assert claim(run, "hash") is False
+    assert claim(run, "hash") is Claim.FINISHED
+    assert claim(run, "hash", resume=True) is Claim.FINISHED
     assert [found.path for found in find_runs(tmp_path)] == [run.path]
 
 
 @pytest.mark.parametrize("status", ["running", "failed", "interrupted"])
 def test_an_unfinished_run_is_refused_naming_resume(tmp_path: Path, status: str) -> None:
     run = started(tmp_path / "ant" / "run", status)
-    with pytest.raises(ExneatError, match=f"status {status}.*\n.*resume=true"):
+    with pytest.raises(ExneatError, match=f"{status}.*\n.*resume=true"):
         claim(run, "hash")
-    assert claim(run, "hash", resume=True) is True
+    assert claim(run, "hash", resume=True) is Claim.CONTINUE
+
+
+@pytest.mark.parametrize("status", ["done", "running"])
+def test_a_run_may_be_made_longer_by_resume_and_never_shorter(tmp_path: Path, status: str) -> None:
+    run = started(tmp_path / "run", status)
+    with pytest.raises(ExneatError, match=r"resume=true"):
+        claim(run, "hash", generations=6)
+    assert claim(run, "hash", resume=True, generations=6) is Claim.CONTINUE
+    with pytest.raises(ExneatError, match="holds a run of 5 generations, and 4 are asked for"):
+        claim(run, "hash", resume=True, generations=4)
+
+
+def test_a_run_of_another_format_is_refused_by_its_number(tmp_path: Path) -> None:
+    run = started(tmp_path / "run", "done")
+    run.update_manifest(format=1)
+    with pytest.raises(ExneatError, match=f"holds a run of format 1, expected {MANIFEST_FORMAT}"):
+        claim(run, "hash", resume=True)
 
 
 @pytest.mark.parametrize("resume", [True, False])
@@ -120,26 +148,28 @@ def test_somebody_elses_directory_is_never_claimed(tmp_path: Path, resume: bool)
     with pytest.raises(ExneatError, match=r"without manifest\.json"):
         claim(notes, "hash", resume=resume)
     other = started(tmp_path / "other", "done", "another hash")
-    with pytest.raises(ExneatError, match="another configuration"):
-        claim(other, "hash", resume=resume)
+    asked = {"task": {"name": "ant", "patience": 7}}
+    with pytest.raises(ExneatError, match=r"holds another run: task\.patience is 100 there, 7 here"):
+        claim(other, "hash", resume=resume, **asked)
 
 
-def test_what_a_run_left_that_was_killed_before_its_manifest_is_taken_up_by_resume_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize("resume", [True, False])
+def test_what_a_run_left_that_was_killed_before_its_manifest_is_taken_up(tmp_path: Path, resume: bool) -> None:
     begun = RunDirectory(tmp_path / "begun")
     begun.path.mkdir()
-    for left in ((), ("config.yaml", ".manifest.json.7.tmp")):
-        for name in left:
-            (begun.path / name).write_text("half")
-        with pytest.raises(ExneatError, match=r"without manifest\.json"):
-            claim(begun, "hash")
-        assert claim(begun, "hash", resume=True) is True
+    assert claim(begun, "hash", resume=resume) is Claim.BEGIN
+    (begun.path / ".manifest.json.7.tmp").write_text("half")
+    assert claim(begun, "hash", resume=resume) is Claim.BEGIN
 
 
 def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) -> None:
     run = started(tmp_path / "run", "running")
-    with run.claimed("hash", resume=True), pytest.raises(ExneatError, match=r"another process .* \(process id 12345\)"):
+    assert not is_held(run.path)
+    refused = pytest.raises(ExneatError, match=rf"another process .* \(process id {os.getpid()}\)")
+    with run.claimed("hash", SETTINGS, resume=True), refused:
+        assert is_held(run.path)
         claim(run, "hash", resume=True)
-    assert claim(run, "hash", resume=True) is True
+    assert claim(run, "hash", resume=True) is Claim.CONTINUE
 
 
 @pytest.mark.parametrize("failing", [1, 2])

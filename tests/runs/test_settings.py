@@ -35,7 +35,8 @@ def test_seeds_share_the_hash_in_the_directory_and_everything_else_changes_it() 
     assert len(short_hash()) == 6
     assert short_hash(seed=0) == short_hash(seed=9)
     assert short_hash(output="elsewhere", name="other") == short_hash()
-    for changes in ({"generations": 3}, {"pairing": "index"}, {"task": AntTask(patience=3)}, {"linkage": "output"}):
+    assert short_hash(generations=3) == short_hash(), "a run may be made longer"
+    for changes in ({"population": 3}, {"pairing": "index"}, {"task": AntTask(patience=3)}, {"linkage": "output"}):
         assert short_hash(**changes) != short_hash(), changes
 
 

@@ -65,7 +65,8 @@ def test_neat_trains_and_leaves_every_file_of_the_design(tmp_path: Path) -> None
     finished = train(tiny(tmp_path, algorithm="neat"))
     names = {path.name for path in finished.directory.path.iterdir()}
     assert names == {
-        *("manifest.json", "config.yaml", "history.csv", "champion.json", "hall_of_fame.jsonl", "trace.csv")
+        *("manifest.json", "config.yaml", "history.csv", "champion.json", "hall_of_fame.jsonl", "trace.csv"),
+        *("checkpoint-000001.npz", "checkpoint-000002.npz"),
     }
     assert finished.directory.path.name.startswith("neat-s0-")
 
