@@ -1,6 +1,6 @@
 """Everything on disk: layout, columns, champions, manifests."""
 
-from exneat_cli.records import provenance
+from exneat_cli.records import disk, provenance
 from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.files import make_directory, read_json, read_yaml, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
@@ -26,6 +26,7 @@ __all__ = [
     "RobustnessRow",
     "RunDirectory",
     "configuration_hash",
+    "disk",
     "find_runs",
     "make_directory",
     "merge_robustness",
