@@ -17,6 +17,7 @@ COMMANDS = {
     "evaluate": "test finished runs under perturbations",
     "report": "make tables, figures and a page of them from the runs there are",
     "inspect": "show a run's wiring, or list the runs",
+    "doctor": "say whether this machine is fit for exneat, and what to mend",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
@@ -26,6 +27,8 @@ USAGE = {
     "report": "usage: exneat report [budget=paper|quick|smoke] [only=figure-4.3] [experiment=<name or file.yaml>]\n"
     "  [axis=generation|episodes|env_steps] [output=<root of runs, outputs by default>]",
     "inspect": "usage: exneat inspect [run=<run directory>] [output=<root of runs, outputs by default>]",
+    "doctor": "usage: exneat doctor [output=<root of runs, outputs by default>]\n"
+    "  each line is ok, degraded (works, but slower or in part) or broken; exit code 1 if anything is broken",
 }
 """What --help prints for the commands that Hydra does not answer for."""
 
@@ -44,11 +47,14 @@ usage: exneat <command> [key=value ...]
   exneat report                                 outputs/report/index.html
   exneat inspect                                the runs under outputs/
   exneat inspect run=outputs/ant/<run>          one run's modules, sensors and joints
+  exneat doctor                                 whether this machine is fit for exneat
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 1 a job failed, 2 refused, 130 or 143 interrupted.
+    """Run one command; returns its exit code.
+
+    0 is done, 1 a failed job or an unfit machine, 2 refused, 130 or 143 interrupted.
 
     Args:
         arguments: without the program's name; None takes the process's own.

@@ -1,6 +1,6 @@
 """Everything on disk: layout, columns, champions, manifests."""
 
-from exneat_cli.records import provenance
+from exneat_cli.records import disk, provenance
 from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, read_json, read_yaml, write_csv, write_json, write_whole
@@ -33,6 +33,7 @@ __all__ = [
     "RobustnessRow",
     "RunDirectory",
     "configuration_hash",
+    "disk",
     "find_runs",
     "is_held",
     "make_directory",

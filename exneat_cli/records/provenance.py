@@ -32,6 +32,17 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
+def available_memory() -> int | None:
+    """Bytes of memory that a new process may take without others being swapped out; None where it is not told."""
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return None
+
+
 def git_commit() -> str | None:
     """Commit of the checkout that exneat runs from, with ``-dirty`` if it was changed; None if installed."""
     root = Path(exneat_cli.__file__).parents[1]

@@ -36,14 +36,19 @@ def cache_directory() -> Path | None:
         for path in sorted((package / room).glob("*.py")):
             digest.update(path.read_bytes())
     try:
-        directory = _cache_root() / digest.hexdigest()[:16]
+        directory = cache_root() / digest.hexdigest()[:16]
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):  # RuntimeError: a user without a home directory
         return None
     return directory if os.access(directory, os.W_OK) else None
 
 
-def _cache_root() -> Path:
+def cache_root() -> Path:
+    """Where caches of all versions of the code lie side by side; see `cache_directory`.
+
+    Raises:
+        RuntimeError: nothing is chosen and the user has no home directory.
+    """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "exneat"

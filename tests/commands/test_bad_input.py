@@ -206,6 +206,9 @@ def test_a_directory_that_holds_something_else_is_refused(tmp_path: Path, capfd:
         (["inspect", "run=nowhere"], "no run is there"),
         (["inspect", "somewhere"], "expected run="),
         (["inspect", "run="], "expected run="),
+        (["doctor", "output="], "expected output="),
+        (["doctor", "run=outputs"], "expected output="),
+        (["doctor", "quickly"], "quickly: expected output="),
     ],
 )
 def test_bad_commands_are_refused(arguments: list[str], named: str, capfd: pytest.CaptureFixture[str]) -> None:
