@@ -32,6 +32,9 @@ def held(directory: Path) -> Iterator[None]:
         except BlockingIOError:
             process = _holder(descriptor) or "unknown"
             raise ExneatError(f"{directory}: another process is writing there (process id {process})") from None
+        except OSError as error:
+            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that knows flock"
+            raise ExneatError(why) from error
         if not _is_still(directory, descriptor):
             raise ExneatError(f"{directory}: was removed by another process at this moment; try again")
         yield
