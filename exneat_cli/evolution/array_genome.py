@@ -10,6 +10,7 @@ import random
 from collections.abc import Mapping
 from itertools import count
 from operator import attrgetter
+from typing import TextIO
 
 import numpy as np
 from neat.genes import DefaultConnectionGene, DefaultNodeGene
@@ -107,6 +108,11 @@ class ArrayGenome:
         """The configuration from the items of the section that bears the class's name."""
         genes = {"node_gene_type": DefaultNodeGene, "connection_gene_type": DefaultConnectionGene}
         return ArrayGenomeConfig({**param_dict, **genes}, cls.__name__)
+
+    @classmethod
+    def write_config(cls, f: TextIO, config: ArrayGenomeConfig) -> None:
+        """Write what `parse_config` reads; `neat.Config.save` asks for it."""
+        config.save(f)
 
     def __init__(self, key: int) -> None:
         self.key = key
