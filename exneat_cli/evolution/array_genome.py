@@ -35,6 +35,7 @@ from exneat_cli.evolution.structure import (
 
 _FIXED = {
     "initial_connection": INITIAL_CONNECTIONS,
+    # Left out it is the string "false", which neat-python's own genomes take for true.
     "single_structural_mutation": ("False", "false"),
     "structural_mutation_surer": ("default", "false"),
     "aggregation_default": ("sum",),
