@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from operator import attrgetter
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from neat.genes import DefaultConnectionGene, DefaultNodeGene
@@ -36,6 +36,7 @@ from exneat_cli.seeding import generator_in
 
 _FIXED = {
     "initial_connection": INITIAL_CONNECTIONS,
+    # Left out it is the string "false", which neat-python's own genomes take for true.
     "single_structural_mutation": ("False", "false"),
     "structural_mutation_surer": ("default", "false"),
     "aggregation_default": ("sum",),
@@ -118,6 +119,11 @@ class ArrayGenome:
         """The configuration from the items of the section that bears the class's name."""
         genes = {"node_gene_type": DefaultNodeGene, "connection_gene_type": DefaultConnectionGene}
         return ArrayGenomeConfig({**param_dict, **genes}, cls.__name__)
+
+    @classmethod
+    def write_config(cls, f: TextIO, config: ArrayGenomeConfig) -> None:
+        """Write what `parse_config` reads; `neat.Config.save` asks for it."""
+        config.save(f)
 
     def __init__(self, key: int) -> None:
         self.key = key

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -33,23 +34,23 @@ def genome_from_data(data: dict[str, Any]) -> ArrayGenome:
         KeyError, OverflowError, TypeError, ValueError: a field is missing, of the wrong type or not finite; a node
             or connection comes twice; a connection leads from or to a node that does not exist.
     """
-    genome = ArrayGenome(int(data["id"]))
+    genome = ArrayGenome(index(data["id"]))
     nodes = [
         (
-            int(entry["id"]),
+            index(entry["id"]),
             _finite(entry["bias"]),
             _finite(entry["response"]),
-            ACTIVATIONS.index(entry["activation"]),
+            _activation(entry["activation"]),
         )
         for entry in data["nodes"]
     ]
     connections = [
         (
-            int(entry["to"]),
-            int(entry["from"]),
-            int(entry["innovation"]),
+            index(entry["to"]),
+            index(entry["from"]),
+            index(entry["innovation"]),
             _finite(entry["weight"]),
-            bool(entry["enabled"]),
+            _flag(entry["enabled"]),
         )
         for entry in data["connections"]
     ]
@@ -69,8 +70,19 @@ def _check_ends(nodes: set[int], ends: list[tuple[int, ...]]) -> None:
             raise ValueError(f"the connection from {source} to {target} has an end that does not exist")
 
 
-def _finite(value: object) -> float:
-    number = float(value)  # type: ignore[arg-type]
-    if not math.isfinite(number):
+def _activation(name: object) -> int:
+    if name not in ACTIVATIONS:
+        raise ValueError(f"expected an activation of {', '.join(ACTIVATIONS)}, got {name!r}")
+    return ACTIVATIONS.index(name)
+
+
+def _flag(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"expected true or false, got {value!r}")
+    return value
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
         raise ValueError(f"expected a finite number, got {value!r}")
-    return number
+    return float(value)

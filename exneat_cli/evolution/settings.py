@@ -189,6 +189,8 @@ def _structure(settings: EvolutionSettings) -> dict[str, object]:
     return {
         "feed_forward": settings.feed_forward,
         "initial_connection": settings.initial_connection,
+        # neat-python 2.0 takes its default, the string "false", for true.
+        "single_structural_mutation": False,
         "compatibility_disjoint_coefficient": settings.disjoint_coefficient,
         "compatibility_weight_coefficient": settings.weight_coefficient,
         "conn_add_prob": settings.connection_add,

@@ -53,7 +53,7 @@ def random_genome(seed: int, config: neat.Config, mutations: int) -> ArrayGenome
 
 
 def wild(settings: EvolutionSettings) -> EvolutionSettings:
-    rates = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.6)
+    rates = {"node_add": 0.6, "node_delete": 0.4, "connection_add": 0.6, "connection_delete": 0.4}
     changes = {**rates, "genome": "stock", "weight_sd": 1.0, "bias_sd": 1.0}
     return EvolutionSettings(**{**vars(settings), **changes})  # type: ignore[arg-type]
 
