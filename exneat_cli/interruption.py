@@ -29,6 +29,7 @@ class _Heard:
     """What is known of signals so far; handlers run in the main thread alone."""
 
     first: int | None = None
+    watch: threading.Timer | None = None
     waiting: int | None = None
     writes_in_hand = 0
 
@@ -39,7 +40,9 @@ def listen() -> None:
     A process that is still there after `PATIENCE` is ended too, with what it started: libraries may swallow
     an exception that comes from a signal.
     """
-    _Heard.first = _Heard.waiting = None
+    if _Heard.watch is not None:
+        _Heard.watch.cancel()
+    _Heard.first = _Heard.waiting = _Heard.watch = None
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _hear)
 
@@ -68,9 +71,9 @@ def _hear(number: int, frame: object) -> None:
     if _Heard.first is not None:
         _end(number)
     _Heard.first = number
-    watch = threading.Timer(PATIENCE, _end, (number,))
-    watch.daemon = True
-    watch.start()
+    _Heard.watch = threading.Timer(PATIENCE, _end, (number,))
+    _Heard.watch.daemon = True
+    _Heard.watch.start()
     if _Heard.writes_in_hand:
         _Heard.waiting = number
     else:

@@ -1,0 +1,144 @@
+"""Checkpoints are whole, of this run and of this version, or they are not read."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from exneat_cli.records import Checkpoint, read_checkpoints, write_checkpoint
+
+ARRAYS = {"0.current.id": np.arange(5), "0.current.node.bias": np.linspace(0.0, 1.0, 7)}
+PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}
+
+
+def written(directory: Path, generation: int = 3, configuration_hash: str = "hash") -> Path:
+    write_checkpoint(directory, Checkpoint(generation, PLAIN, ARRAYS), configuration_hash)
+    return directory / f"checkpoint-{generation:06d}.npz"
+
+
+def read(directory: Path) -> list[Checkpoint | str]:
+    return list(read_checkpoints(directory, "hash"))
+
+
+def is_whole(found: Checkpoint | str, generation: int = 3) -> bool:
+    if isinstance(found, str):
+        return False
+    assert found.generation == generation
+    assert found.plain == PLAIN
+    assert found.arrays.keys() == ARRAYS.keys()
+    return all(np.array_equal(found.arrays[name], column) for name, column in ARRAYS.items())
+
+
+def test_what_was_written_is_read_the_newest_first(tmp_path: Path) -> None:
+    for generation in (9, 10, 11, 1000000):
+        written(tmp_path, generation)
+    assert [found.generation for found in read(tmp_path) if isinstance(found, Checkpoint)] == [1000000, 11]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_it_is_a_plain_npz_that_needs_no_pickle(tmp_path: Path) -> None:
+    with np.load(written(tmp_path), allow_pickle=False) as archive:
+        assert set(archive.files) == {*ARRAYS, "state", "digest"}
+        assert json.loads(archive["state"].tobytes())["fitness"] == PLAIN["fitness"]
+
+
+def test_a_number_that_is_not_finite_is_never_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError):
+        write_checkpoint(tmp_path, Checkpoint(1, {"fitness": [float("nan")]}, {}), "hash")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_any_other_file_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "checkpoint-best.npz").write_bytes(b"mine")
+    written(tmp_path)
+    assert len(read(tmp_path)) == 1
+
+
+@given(position=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path, position: float, bit: int) -> None:
+    path = written(tmp_path)
+    data = bytearray(path.read_bytes())
+    data[int(position * len(data))] ^= 1 << bit
+    path.write_bytes(bytes(data))
+    (found,) = read(tmp_path)
+    assert isinstance(found, str) or is_whole(found)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_checkpoint_is_refused(tmp_path: Path, share: float) -> None:
+    path = written(tmp_path)
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    (found,) = read(tmp_path)
+    assert isinstance(found, str)
+    assert str(path) in found
+
+
+def npz(compressed: bool = False, **members: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, **members)  # type: ignore[arg-type]
+    return buffer.getvalue()
+
+
+def huge_shape() -> bytes:
+    header = b"\x93NUMPY\x01\x00" + (118).to_bytes(2, "little")
+    text = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000,), }".ljust(117) + b"\n"
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("digest.npy", header + text)
+        archive.writestr("state.npy", header + text)
+    return buffer.getvalue()
+
+
+class Bomb:
+    """Would run code if it were ever unpickled."""
+
+    def __reduce__(self) -> tuple[Callable[[str], object], tuple[str]]:
+        return pytest.fail, ("a checkpoint was unpickled",)
+
+
+FOREIGN = {
+    "nothing": b"",
+    "text": b"hello",
+    "JSON": b'{"format": 1}',
+    "a pickle": pickle.dumps({"a": 1}),
+    "an NPZ of something else": npz(a=np.arange(3)),
+    "an NPZ with a pickled object": npz(state=np.array([Bomb()], dtype=object), digest=np.zeros(32, np.uint8)),
+    "a compressed NPZ": npz(compressed=True, state=np.zeros(10**6, np.uint8), digest=np.zeros(32, np.uint8)),
+    "a shape that no memory holds": huge_shape(),
+    "a wrong digest": npz(state=np.frombuffer(b"{}", np.uint8), digest=np.zeros(32, np.uint8)),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_foreign_file_is_refused_by_its_path(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "checkpoint-000003.npz"
+    path.write_bytes(FOREIGN[name])
+    (found,) = read(tmp_path)
+    assert isinstance(found, str)
+    assert found.startswith(f"{path}: damaged")
+
+
+def test_the_checkpoint_before_a_damaged_one_is_still_read(tmp_path: Path) -> None:
+    written(tmp_path, 2)
+    written(tmp_path, 3).write_bytes(b"")
+    damaged, found = read(tmp_path)
+    assert isinstance(damaged, str)
+    assert is_whole(found, 2)
+
+
+def test_a_checkpoint_of_another_run_or_under_another_number_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, configuration_hash="other")
+    assert "its configuration_hash is not hash" in str(read(tmp_path)[0])
+    path.unlink()
+    written(tmp_path).rename(tmp_path / "checkpoint-000004.npz")
+    assert "its generation is not 4" in str(read(tmp_path)[0])

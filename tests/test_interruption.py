@@ -1,0 +1,86 @@
+"""Ctrl-C and SIGTERM wait for a write in hand, and for nothing else."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.interruption import Interrupted, finishing, listen
+
+
+@pytest.fixture
+def listening() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    listen()
+    yield
+    listen()
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("listening")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_raised_with_its_number(number: int) -> None:
+    with pytest.raises(Interrupted) as caught:
+        signal.raise_signal(number)
+    assert caught.value.number == number
+
+
+@pytest.mark.usefixtures("listening")
+def test_a_write_in_hand_is_finished_first() -> None:
+    done = []
+
+    def write() -> None:
+        with finishing():
+            with finishing():
+                signal.raise_signal(signal.SIGTERM)
+                done.append("inner")
+            done.append("outer")
+        done.append("never")
+
+    with pytest.raises(Interrupted):
+        write()
+    assert done == ["inner", "outer"]
+
+
+def in_process(code: str) -> subprocess.CompletedProcess[str]:
+    prelude = (
+        "import os, signal, subprocess, sys, time\nfrom exneat_cli.interruption import finishing, listen\nlisten()\n"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", prelude + textwrap.dedent(code)], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_a_second_signal_ends_the_process_at_once_even_in_the_midst_of_a_write() -> None:
+    done = in_process("""
+        with finishing():
+            os.kill(os.getpid(), signal.SIGINT)
+            print("still writing", flush=True)
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.1)
+            print("never", flush=True)
+    """)
+    assert done.stdout == "still writing\n"
+    assert done.returncode == 130
+
+
+def test_a_process_that_swallows_the_signal_is_ended_with_its_children(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+    done = in_process(f"""
+        child = subprocess.Popen(["sleep", "600"])
+        open({str(note)!r}, "w").write(str(child.pid))
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(600)
+        except KeyboardInterrupt:
+            time.sleep(600)
+    """)
+    assert done.returncode == 143
+    assert not Path(f"/proc/{note.read_text()}").exists() or "Z" in Path(f"/proc/{note.read_text()}/stat").read_text()
