@@ -55,7 +55,7 @@ figure-%: $(VENV)/installed ## one figure, e.g. make figure-4.3
 table-%: $(VENV)/installed ## one table, e.g. make table-5.5
 	$(BIN)/exneat report only=$@ $(OF_BUDGET)
 
-bench: $(VENV)/installed ## how fast it is, as ratios (a few minutes on an idle machine)
+bench: $(VENV)/installed ## how fast it is, as ratios, in five parts (several minutes on an idle machine)
 	$(BIN)/python -m tests.bench
 
 wheel: $(VENV)/installed ## build the wheel into dist/

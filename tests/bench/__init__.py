@@ -1,1 +1,1 @@
-"""How fast episodes and trainings are, most of it as ratios measured side by side: `python -m tests.bench`."""
+"""How fast evolution, episodes and trainings are, most of it as ratios: `python -m tests.bench`."""

@@ -8,12 +8,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 from exneat_cli.records import provenance
 from tests.bench.bare_physics import compare_with_bare_physics
+from tests.bench.evolution_growth import (
+    measure_growth_with_modules,
+    measure_growth_with_population,
+    measure_growth_with_threads,
+)
+from tests.bench.evolution_speed import INITIAL_CONNECTIONS, compare_with_stock
+from tests.bench.generation_cost import ARMS, compare_with_physics
 from tests.bench.grid_worlds import (
     PAPER_ALGORITHMS,
     PAPER_TASKS,
@@ -25,6 +33,7 @@ from tests.bench.gymnasium_loop import compare_with_gymnasium
 from tests.bench.measurement import Row, VerificationError
 from tests.bench.processes import measure_help, measure_memory, measure_smoke_training
 from tests.bench.table import print_table, write_table
+from tests.bench.training_speed import compare_with_neat_python
 from tests.bench.two_threads import compare_threads, usable_cores
 from tests.bench.workload import find_workload
 
@@ -32,33 +41,39 @@ FOLDER = Path("outputs") / "bench"
 SINGLE_THREAD_EPISODES = 4
 THREADED_EPISODES = 16
 
+Pieces = dict[str, Callable[[], Iterable[Row]]]
+"""What a part measures, piece by piece, and how that is called while it lasts."""
+
 
 def main() -> int:
     """Run the benchmark; returns the exit code."""
     options = _options()
-    parts = {"ant": (_measure_ant, "ant_speed.csv"), "grid": (_measure_grid_worlds, "grid_worlds.csv")}
     versions = ", ".join(f"{name} {version}" for name, version in provenance.versions().items())
     print(f"{provenance.processor()}, {usable_cores()} cores; {versions}", flush=True)
-    for name in [options.only] if options.only else parts:
-        measure, table = parts[name]
+    for name in [options.only] if options.only else PARTS:
+        pieces, table = PARTS[name]
         try:
-            rows = measure(options)
+            rows = _measure(pieces(options))
         except VerificationError as error:
             print(f"bench: {error}", file=sys.stderr)
             return 1
         print()
         print_table(rows)
         write_table(FOLDER / table, rows)
-        print(f"\nRatios: both sides in one process, taking turns. Written: {FOLDER / table}", flush=True)
+        print(f"\nRatios: both sides taking turns. Written: {FOLDER / table}", flush=True)
     return 0
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
-    parser.add_argument("--only", choices=("ant", "grid"), help="measure this part alone")
-    parser.add_argument("--full", action="store_true", help="ant: measure memory over the whole quick budget")
+    parser.add_argument("--only", choices=tuple(PARTS), help="measure this part alone")
+    parser.add_argument(
+        "--full", action="store_true", help="training: 30 generations; ant: measure memory over the whole paper budget"
+    )
     parser.add_argument("--skip-paper", action="store_true", help="grid: leave out the trainings of the paper budget")
-    parser.add_argument("--repetitions", type=_at_least_one, default=11, help="pairs of runs per ratio (default 11)")
+    parser.add_argument(
+        "--repetitions", type=_at_least_one, default=11, help="ant, grid: pairs of runs per ratio (default 11)"
+    )
     return parser.parse_args()
 
 
@@ -68,40 +83,70 @@ def _at_least_one(text: str) -> int:
     return int(text)
 
 
-def _measure_ant(options: argparse.Namespace) -> list[Row]:
+def _evolution(options: argparse.Namespace) -> Pieces:
+    stock: Pieces = {
+        f"array against neat-python's genomes, {name}": partial(_one, partial(compare_with_stock, name))
+        for name in INITIAL_CONNECTIONS
+    }
+    return {
+        **stock,
+        "growth with population": measure_growth_with_population,
+        "growth with modules": measure_growth_with_modules,
+        "growth with threads": lambda: [measure_growth_with_threads()],
+    }
+
+
+def _generation(options: argparse.Namespace) -> Pieces:
+    return {f"whole generations, {arm}": partial(_one, partial(compare_with_physics, arm)) for arm in ARMS}
+
+
+def _training(options: argparse.Namespace) -> Pieces:
+    return {"whole training": lambda: [compare_with_neat_python(full=options.full)]}
+
+
+def _ant(options: argparse.Namespace) -> Pieces:
     _say("looking for random networks that keep upright")
     many = find_workload(THREADED_EPISODES)
     few = many.first(SINGLE_THREAD_EPISODES)
     repetitions: int = options.repetitions
-    return _measure(
-        {
-            "bare physics": lambda: (compare_with_bare_physics(few, repetitions),),
-            "two threads": lambda: (compare_threads(many, repetitions),),
-            "Gymnasium": lambda: (compare_with_gymnasium(few, repetitions),),
-            "exneat --help": lambda: (measure_help(),),
-            "smoke training": measure_smoke_training,
-            "memory": lambda: (measure_memory(full=options.full),),
-        }
-    )
+    return {
+        "bare physics": lambda: [compare_with_bare_physics(few, repetitions)],
+        "two threads": lambda: [compare_threads(many, repetitions)],
+        "Gymnasium": lambda: [compare_with_gymnasium(few, repetitions)],
+        "exneat --help": lambda: [measure_help()],
+        "smoke training": measure_smoke_training,
+        "memory": lambda: [measure_memory(full=options.full)],
+    }
 
 
-def _measure_grid_worlds(options: argparse.Namespace) -> list[Row]:
+def _grid(options: argparse.Namespace) -> Pieces:
     repetitions: int = options.repetitions
-    pieces: dict[str, Callable[[], tuple[Row, ...]]] = {
-        "general maze": lambda: (compare_general_maze(repetitions),),
-        "hunting": lambda: (compare_hunting(repetitions),),
+    pieces: Pieces = {
+        "general maze": lambda: [compare_general_maze(repetitions)],
+        "hunting": lambda: [compare_hunting(repetitions)],
     }
     if not options.skip_paper:
-        arms = [(task, algorithm) for task in PAPER_TASKS for algorithm in PAPER_ALGORITHMS]
-        pieces |= {f"paper budget, {task}, {name}": partial(_paper_row, task, name) for task, name in arms}
-    return _measure(pieces)
+        for task, algorithm in product(PAPER_TASKS, PAPER_ALGORITHMS):
+            measure = partial(measure_paper_training, task, algorithm)
+            pieces[f"paper budget, {task}, {algorithm}"] = partial(_one, measure)
+    return pieces
 
 
-def _paper_row(task: str, algorithm: str) -> tuple[Row]:
-    return (measure_paper_training(task, algorithm),)
+PARTS: dict[str, tuple[Callable[[argparse.Namespace], Pieces], str]] = {
+    "evolution": (_evolution, "evolution.csv"),
+    "generation": (_generation, "generation.csv"),
+    "training": (_training, "training.csv"),
+    "ant": (_ant, "ant_speed.csv"),
+    "grid": (_grid, "grid_worlds.csv"),
+}
+"""What can be measured alone, and the table that it fills."""
 
 
-def _measure(pieces: Mapping[str, Callable[[], tuple[Row, ...]]]) -> list[Row]:
+def _one(measure: Callable[[], Row]) -> list[Row]:
+    return [measure()]
+
+
+def _measure(pieces: Pieces) -> list[Row]:
     rows: list[Row] = []
     for name, measure in pieces.items():
         _say(f"measuring: {name}")

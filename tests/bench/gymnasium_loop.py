@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,8 +10,9 @@ import gymnasium
 import neat
 import numpy as np
 
+from exneat_cli.evolution import to_stock
 from exneat_cli.rollouts import Outcomes, Runner
-from exneat_cli.seeding import generator
+from exneat_cli.seeding import EpisodeSeeds, generator
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import Workload, open_runner
 
@@ -22,20 +24,21 @@ TOLERANCE = 1e-6
 def compare_with_gymnasium(workload: Workload, repetitions: int) -> Row:
     """Environment steps per second of ours, on one thread, over those of neat-python on Gymnasium's Ant-v5.
 
-    Both times begin with the genomes: ours has `assemble`, neat-python's has `FeedForwardNetwork.create`.
+    Both times begin with genomes of each side's own: ours has `assemble`, neat-python's has
+    `FeedForwardNetwork.create`.
 
     Raises:
         VerificationError: the forward rewards of an episode differ.
     """
     env = gymnasium.make("Ant-v5")
+    references = [
+        partial(_forward_reward, env, to_stock(genome), workload.config, workload.seeds) for genome in workload.genomes
+    ]
     with open_runner(threads=1) as runner:
-        _check_rewards(workload, runner, env)
+        _check_rewards(workload, runner, references)
         pairs = [
-            Pair(
-                partial(seconds_of, partial(_run_ours, runner, single)),
-                partial(seconds_of, partial(_forward_reward, env, single)),
-            )
-            for single in workload.one_by_one()
+            Pair(partial(seconds_of, partial(_run_ours, runner, single)), partial(seconds_of, reference))
+            for single, reference in zip(workload.one_by_one(), references, strict=True)
         ]
         ratios = speed_ratios(pairs, repetitions)
     env.close()
@@ -46,10 +49,11 @@ def _run_ours(runner: Runner, workload: Workload) -> Outcomes:
     return runner.run(workload.brains(), [workload.seeds])
 
 
-def _forward_reward(env: gymnasium.Env[Any, Any], single: Workload) -> float:
-    (genome,) = single.genomes
-    network = neat.nn.FeedForwardNetwork.create(genome, single.config)
-    env.unwrapped.np_random = generator(single.seeds.world)
+def _forward_reward(
+    env: gymnasium.Env[Any, Any], genome: neat.DefaultGenome, config: neat.Config, seeds: EpisodeSeeds
+) -> float:
+    network = neat.nn.FeedForwardNetwork.create(genome, config)
+    env.unwrapped.np_random = generator(seeds.world)
     observation, _ = env.reset()
     total, over = 0.0, False
     while not over:
@@ -59,10 +63,9 @@ def _forward_reward(env: gymnasium.Env[Any, Any], single: Workload) -> float:
     return total
 
 
-def _check_rewards(workload: Workload, runner: Runner, env: gymnasium.Env[Any, Any]) -> None:
+def _check_rewards(workload: Workload, runner: Runner, references: Sequence[Callable[[], float]]) -> None:
     fitness = _run_ours(runner, workload).fitness[:, 0].tolist()
-    for single, ours in zip(workload.one_by_one(), fitness, strict=True):
-        expected = _forward_reward(env, single)
+    for genome, ours, reference in zip(workload.genomes, fitness, references, strict=True):
+        expected = reference()
         if not abs(ours - expected) <= TOLERANCE * abs(expected):
-            key = single.genomes[0].key
-            raise VerificationError(f"forward reward of genome {key}: {ours!r}; Gymnasium gives {expected!r}")
+            raise VerificationError(f"forward reward of genome {genome.key}: {ours!r}; Gymnasium gives {expected!r}")

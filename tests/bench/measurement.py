@@ -24,18 +24,18 @@ class Bar:
 
     Attributes:
         value: in the row's unit.
-        at_least: whether the median should be `value` or more, else less than `value`.
+        at_least: whether the median should be `value` or more, else `value` or less.
     """
 
     value: float
     at_least: bool
 
     def __str__(self) -> str:
-        return f"{'at least' if self.at_least else 'under'} {self.value:g}"
+        return f"{'at least' if self.at_least else 'at most'} {self.value:g}"
 
     def met_by(self, median: float) -> bool:
         """Whether `median`, in the row's unit, reaches the bar."""
-        return median >= self.value if self.at_least else median < self.value
+        return median >= self.value if self.at_least else median <= self.value
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ class Row:
         comparison: what was compared or measured, in words.
         unit: one of `RATIO`, `SECONDS` and `MEGABYTES`.
         values: one per repetition, in that unit.
-        bar: what their median should reach.
+        bar: what their median should reach; None where nothing is asked of it.
         note: what a reader needs to judge the figures by.
     """
 
     comparison: str
     unit: str
     values: Sequence[float]
-    bar: Bar
+    bar: Bar | None
     note: str = ""
 
     @property
@@ -63,7 +63,9 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """``meets`` or ``misses``."""
+        """``meets`` or ``misses``; ``-`` without a bar."""
+        if self.bar is None:
+            return "-"
         return "meets" if self.bar.met_by(self.median) else "misses"
 
 
@@ -99,6 +101,21 @@ def speed_ratios(pairs: Sequence[Pair], repetitions: int) -> list[float]:
         our_seconds, reference_seconds = (sum(side) for side in zip(*seconds, strict=True))
         ratios.append(reference_seconds / our_seconds)
     return ratios
+
+
+def growth_ratios(costs: Sequence[Callable[[], float]], repetitions: int) -> list[list[float]]:
+    """How many times as long each size of the work takes as the one before it.
+
+    Args:
+        costs: one per size, in rising order: does the work once and returns its wall seconds. All sizes
+            take turns.
+        repetitions: how often every size is done.
+
+    Returns:
+        For every size but the first, one value per repetition.
+    """
+    rounds = [[cost() for cost in costs] for _ in range(repetitions)]
+    return [[seconds[k] / seconds[k - 1] for seconds in rounds] for k in range(1, len(costs))]
 
 
 class Pace(NamedTuple):

@@ -13,7 +13,7 @@ COLUMNS = ("comparison", "unit", "median", "min", "max", "repetitions", "bar", "
 
 def _cells(row: Row) -> tuple[object, ...]:
     figures = (row.median, min(row.values), max(row.values))
-    return (row.comparison, row.unit, *figures, len(row.values), str(row.bar), row.verdict, row.note)
+    return (row.comparison, row.unit, *figures, len(row.values), str(row.bar or "-"), row.verdict, row.note)
 
 
 def print_table(rows: Sequence[Row]) -> None:

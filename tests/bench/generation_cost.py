@@ -1,0 +1,166 @@
+"""Whole training generations against the physics alone: what evolution, brains, rewards and records add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.brains import Brain, Brains, RandomActions
+from exneat_cli.rollouts import Executor, Outcomes, Runner
+from exneat_cli.runs import RunSettings
+from exneat_cli.runs.training import _Training
+from exneat_cli.seeding import EpisodeSeeds, generator
+from exneat_cli.tasks import AntTask, Simulation
+from exneat_cli.tasks.ant_dynamics import AntWorld, restart
+from exneat_cli.tasks.compiling import compiled
+from exneat_cli.wiring import Geometry
+from tests.bench.bare_physics import Recording, check_x, record, replay
+from tests.bench.measurement import RATIO, Bar, Row, VerificationError, seconds_of
+from tests.bench.two_threads import usable_cores
+
+_Item = TypeVar("_Item")
+
+ARMS = {
+    "neat": RunSettings(algorithm="neat"),
+    "exneat single/none": RunSettings(),
+    "exneat all/none": RunSettings(geometry=Geometry("all")),
+    "exneat all/full": RunSettings(geometry=Geometry("all"), linkage="full"),
+}
+"""All of population 100, with a central module."""
+GENERATIONS = 5
+"""That are counted, each a ratio of its own; the one before them is not, since it compiles."""
+BAR = Bar(1.15, at_least=False)
+
+
+class WatchedRunner(Runner):
+    """A runner that remembers what it ran last.
+
+    Attributes:
+        brains, episodes, outcomes: see `Runner.run`.
+        seconds: wall seconds of that call.
+    """
+
+    brains: Brains
+    episodes: Sequence[EpisodeSeeds]
+    outcomes: Outcomes
+    seconds: float
+
+    def __enter__(self) -> WatchedRunner:
+        return self
+
+    def run(self, brains: Brains | Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
+        """The same as without watching."""
+        assert isinstance(brains, Brains)
+        self.brains, self.episodes = brains, episodes
+        self.seconds = seconds_of(lambda: setattr(self, "outcomes", super(WatchedRunner, self).run(brains, episodes)))
+        return self.outcomes
+
+
+@compiled
+def replay_from_start(world: AntWorld, controls: NDArray[np.float64]) -> float:
+    """`replay` from where the last reset had put the body; returns the x of the trunk at the end, in metres."""
+    restart(world)
+    replay(world, controls)
+    return float(world.xpos[world.trunk, 0])
+
+
+class BarePhysics:
+    """Threads that do nothing but the physics of recorded episodes; a context manager that ends them.
+
+    They start with the longest episode and take the next whenever one is free, so all end together. The start of
+    the generation's episodes is drawn before the clock starts; putting the body there, once per episode, is part
+    of the time, since every thread has to do that between two episodes: it is one `mj_forward`, about a twentieth of
+    what a single control step costs.
+    """
+
+    def __init__(self, settings: RunSettings, threads: int) -> None:
+        assert isinstance(settings.task, AntTask)
+        self._task = settings.task
+        reset_scale = settings.noise.reset_scale
+        self._simulations = [self._task.open(training=True, reset_scale=reset_scale) for _ in range(threads)]
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="physics")
+
+    def __enter__(self) -> BarePhysics:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._pool.shutdown()
+
+    def seconds(self, runner: WatchedRunner) -> float:
+        """Wall seconds of the physics of all episodes that `runner` ran last.
+
+        Raises:
+            VerificationError: an episode done again was another one.
+        """
+        recordings = self._recordings(runner)
+        recordings.sort(key=lambda recording: -len(recording.controls))
+        return seconds_of(partial(self._replay, recordings))
+
+    def _recordings(self, runner: WatchedRunner) -> list[Recording]:
+        (seeds,) = runner.episodes
+        for simulation in self._simulations:
+            simulation.reset(simulation.world, generator(seeds.world))
+        steps, fitness = runner.outcomes.steps[:, 0].tolist(), runner.outcomes.fitness[:, 0].tolist()
+        recordings: list[Recording] = []
+
+        def check(simulation: Simulation, b: int) -> None:
+            recording = record(self._task, simulation, runner.brains, b)
+            did, expected = (len(recording.controls), recording.fitness), (steps[b], fitness[b])
+            if did != expected:
+                raise VerificationError(f"steps and fitness of an episode step by step: {did}; expected {expected}")
+            recordings.append(recording)
+
+        self._share(check, range(len(steps)))
+        return recordings
+
+    def _replay(self, recordings: Sequence[Recording]) -> None:
+        self._share(_replay_one, recordings)
+
+    def _share(self, work: Callable[[Simulation, _Item], None], items: Iterable[_Item]) -> None:
+        """Do `work` for all items, each thread in a world of its own."""
+        waiting = iter(items)
+
+        def work_on(simulation: Simulation) -> None:
+            for item in waiting:
+                work(simulation, item)
+
+        for worker in [self._pool.submit(work_on, simulation) for simulation in self._simulations]:
+            worker.result()
+
+
+def _replay_one(simulation: Simulation, recording: Recording) -> None:
+    check_x("replayed", replay_from_start(simulation.world, recording.controls), recording.final_x)
+
+
+def compare_with_physics(arm: str) -> Row:
+    """Wall seconds of whole generations over those of their physics on as many threads, one ratio each.
+
+    Args:
+        arm: a key of `ARMS`.
+
+    Raises:
+        VerificationError: an episode done again was another one.
+    """
+    settings, threads = ARMS[arm], usable_cores()
+    walls, ratios, episodes = [], [], []
+    with (
+        WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
+        BarePhysics(settings, threads) as physics,
+    ):
+        training = _Training(settings, runner)
+        for _ in range(1 + GENERATIONS):
+            walls.append(seconds_of(training.advance))
+            episodes.append(runner.seconds)
+            ratios.append(walls[-1] / physics.seconds(runner))
+    steps = training.history[-1].env_steps - training.history[0].env_steps
+    note = (
+        f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
+        f"{np.median(episodes[1:]):.3f} s of it episodes"
+    )
+    name = f"whole Ant generations, {arm} / bare mj_step x 5 + mj_rnePostConstraint, s, {threads} threads"
+    return Row(name, RATIO, ratios[1:], BAR, note)
