@@ -39,8 +39,10 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
     networks = express(wiring, [genome for team in teams for genome in team], feed_forward=feed_forward)
     slots = networks.slots.reshape(-1, members)[:, wiring.subpopulation]
-    bases = wiring.observation_size + np.pad(np.cumsum(slots, axis=1), ((0, 0), (1, 0)))
-    pin_slot = np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index
+    bases = np.full((len(teams), len(wiring.subpopulation) + 1), wiring.observation_size)
+    bases[:, 1:] += np.cumsum(slots, axis=1)
+    # One memory layout, whatever the number of teams: compiled code is compiled for each.
+    pin_slot = np.ascontiguousarray(np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index)
     # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
     # slot still holds the previous step's value anyway.
     copied = wiring.pin_delayed & feed_forward
@@ -48,6 +50,7 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
     link_slot = bases[:, -1:] + np.arange(np.count_nonzero(copied))
     pin_slot[:, copied] = link_slot
     size = bases[:, -1] + np.count_nonzero(copied) + 1
+    output_slot = np.where(wiring.driver < 0, size[:, None] - 1, bases[:, wiring.driver] + wiring.driver_output)
     return Brains(
         observation_size=plan.observation_size,
         size=size,
@@ -55,7 +58,7 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
         first_link=np.arange(len(teams) + 1) * np.count_nonzero(copied),
         link_slot=link_slot.ravel(),
         link_source=link_source.ravel(),
-        output_slot=np.where(wiring.driver < 0, size[:, None] - 1, bases[:, wiring.driver] + wiring.driver_output),
+        output_slot=np.ascontiguousarray(output_slot),
         **_join(wiring, networks, bases, pin_slot)._asdict(),
     )
 

@@ -81,8 +81,8 @@ def _express(shapes, hidden_is_linked, networks, feed_forward):  # type: ignore[
         c, d = networks.first_connection[g], networks.first_connection[g + 1]
         nodes, connections = networks.nodes[a:b], networks.connections[c:d]
         order, slot_of, source_of = networks.order[a:b], networks.slot_of[a:b], networks.source_of[c:d]
-        inputs, hidden, outputs = shapes[g % hidden_is_linked.size]
-        read_outside = outputs + (hidden if hidden_is_linked[g % hidden_is_linked.size] else 0)
+        s = g % hidden_is_linked.size
+        inputs, read_outside = shapes[s, 0], shapes[s, 2] + (shapes[s, 1] if hidden_is_linked[s] else 0)
         _find_sources(nodes, connections, inputs, source_of)
         evaluated = _order(nodes, connections, source_of, read_outside, feed_forward, order)
         networks.evaluated[g] = evaluated
@@ -109,7 +109,9 @@ def _order(nodes, connections, source_of, read_outside, feed_forward, order):  #
     Of a recurrent network, all that are wanted and have an input. Of a feed-forward one, all that are wanted, after
     everything that they read; those on or behind a cycle are left out.
     """
-    wanted = nodes["key"] < read_outside
+    wanted = np.zeros(nodes.size, np.bool_)
+    for row in range(nodes.size):
+        wanted[row] = nodes[row].key < read_outside
     mark_sources(nodes, connections, wanted, True)
     placed = np.zeros(nodes.size, np.bool_)
     count, before = 0, -1
@@ -134,10 +136,8 @@ def _order(nodes, connections, source_of, read_outside, feed_forward, order):  #
 def _assign_slots(nodes, evaluated, inputs, read_outside, slot_of):  # type: ignore[no-untyped-def]
     """Write the local index of each node; returns how many slots there are."""
     slots = read_outside
-    slot_of[:] = -1
     for row in range(nodes.size):
-        if nodes[row].key < read_outside:
-            slot_of[row] = inputs + nodes[row].key
+        slot_of[row] = inputs + nodes[row].key if nodes[row].key < read_outside else -1
     for row in evaluated:
         if slot_of[row] < 0:
             slot_of[row] = inputs + slots

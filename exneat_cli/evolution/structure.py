@@ -59,10 +59,12 @@ def mark_sources(nodes: Nodes, connections: Connections, marked: NDArray[np.bool
         marked: (N,), changed.
         only_enabled: follow no disabled connections.
     """
-    waiting = np.flatnonzero(marked)
     stack = np.empty(nodes.size, np.int64)
-    depth = waiting.size
-    stack[:depth] = waiting
+    depth = 0
+    for row in range(nodes.size):
+        if marked[row]:
+            stack[depth] = row
+            depth += 1
     while depth > 0:
         depth -= 1
         key = nodes[stack[depth]].key
@@ -89,14 +91,21 @@ def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, sou
 
 
 @compiled
+def _put(rows, into, first):  # type: ignore[no-untyped-def]
+    """Copy `rows` to row `first` and on; assigning slices would do the same and take seconds to compile."""
+    for i in range(rows.size):
+        into[first + i] = rows[i]
+
+
+@compiled
 def with_connection(
     connections: Connections, target: int, source: int, innovation: int, weight: float, enabled: bool
 ) -> Connections:
     """A copy with one connection more, in its place; it must not be there already."""
     row = row_of(connections, target, source)
     longer = np.empty(connections.size + 1, CONNECTION)
-    longer[:row] = connections[:row]
-    longer[row + 1 :] = connections[row:]
+    _put(connections[:row], longer, 0)
+    _put(connections[row:], longer, row + 1)
     longer[row].target = target
     longer[row].source = source
     longer[row].innovation = innovation
@@ -109,8 +118,8 @@ def with_connection(
 def without_connection(connections: Connections, row: int) -> Connections:
     """A copy that lacks one row."""
     shorter = np.empty(connections.size - 1, CONNECTION)
-    shorter[:row] = connections[:row]
-    shorter[row:] = connections[row + 1 :]
+    _put(connections[:row], shorter, 0)
+    _put(connections[row + 1 :], shorter, row)
     return shorter
 
 
@@ -118,7 +127,7 @@ def without_connection(connections: Connections, row: int) -> Connections:
 def with_node(nodes: Nodes, key: int, bias: float, response: float, activation: int) -> Nodes:
     """A copy with one node more; its key must be higher than all others."""
     longer = np.empty(nodes.size + 1, NODE)
-    longer[:-1] = nodes
+    _put(nodes, longer, 0)
     longer[-1].key = key
     longer[-1].bias = bias
     longer[-1].response = response
@@ -131,8 +140,8 @@ def without_node(nodes: Nodes, connections: Connections, row: int) -> tuple[Node
     """Copies that lack one node and all connections to and from it."""
     key = nodes[row].key
     shorter = np.empty(nodes.size - 1, NODE)
-    shorter[:row] = nodes[:row]
-    shorter[row:] = nodes[row + 1 :]
+    _put(nodes[:row], shorter, 0)
+    _put(nodes[row + 1 :], shorter, row)
     left = np.empty(connections.size, CONNECTION)
     count = 0
     for i in range(connections.size):

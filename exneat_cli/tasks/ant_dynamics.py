@@ -87,8 +87,11 @@ def restart(world: AntWorld) -> None:
     world.clock[STEPS] = 0
     world.clock[STUCK_STEPS] = 0
     world.clock[WARNINGS] = np.sum(world.warnings)
-    world.qpos[:] = world.start_qpos
-    world.qvel[:] = world.start_qvel
+    # Assigning slices would do the same, and take seconds to compile.
+    for i in range(world.qpos.size):
+        world.qpos[i] = world.start_qpos[i]
+    for i in range(world.qvel.size):
+        world.qvel[i] = world.start_qvel[i]
     mj_forward(world.model, world.data)
     world.mark[0] = world.xpos[world.trunk, 0]
 
