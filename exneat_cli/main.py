@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"exneat: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        print("exneat: interrupted; the same command goes on (exneat train needs resume=true for it)", file=sys.stderr)
+        print("exneat: interrupted; the same command goes on (a single exneat train with resume=true)", file=sys.stderr)
         return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, Champion, RunDirectory, find_runs, read_champion
+from exneat_cli.records import DONE, RUNNING, Champion, RunDirectory, find_runs, is_held, read_champion
 from exneat_cli.wiring import UNTRAINED, Module
 
 
@@ -37,7 +38,7 @@ def _show(run: RunDirectory) -> None:
         why = "a baseline has no networks" if manifest.get("arm") in UNTRAINED else "it is not finished"
         raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
     champion = read_champion(run.champion)
-    print(f"{run.path}  ({manifest.get('status')})")
+    print(f"{run.path}  ({_status(run, manifest)})")
     kind = "feed-forward" if champion.feed_forward else "recurrent"
     subpopulations = len(champion.plan.subpopulation_shapes)
     print(f"{champion.arm}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
@@ -84,11 +85,18 @@ def _list(output: Path) -> None:
     for run in runs:
         try:
             manifest = run.read_manifest()
-            tested = manifest["result"]["champion"] if manifest["status"] == DONE else None
+            status = _status(run, manifest)
+            tested = manifest["result"]["champion"] if status == DONE else None
             figure = f"{tested['fitness_mean']:.4g} (sd {tested['fitness_std']:.3g})" if tested else "-"
-            print(f"{manifest['status']:<12}{manifest['seed']:>5}  {figure:>20}  {run.path}")
+            print(f"{status:<12}{manifest['seed']:>5}  {figure:>20}  {run.path}")
         except (ExneatError, KeyError, TypeError, ValueError):
             print(f"{'damaged':<12}{'?':>5}  {'-':>20}  {run.path}")
+
+
+def _status(run: RunDirectory, manifest: Mapping[str, Any]) -> str:
+    """The manifest's status; a killed process cannot write its own."""
+    status = str(manifest["status"])
+    return "killed" if status == RUNNING and not is_held(run.path) else status
 
 
 def _ranges(indices: Sequence[int]) -> str:

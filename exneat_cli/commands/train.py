@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Sequence
 
@@ -39,6 +40,8 @@ def run(arguments: Sequence[str]) -> int:
 
 def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     settings = settings_from(config)
+    if HydraConfig.get().mode is RunMode.MULTIRUN:
+        settings = dataclasses.replace(settings, resume=True)
     asked = sweeps_from(config, settings.task.name)
     check_sweeps(settings, asked.sweeps, asked.episodes)
     finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])

@@ -15,6 +15,7 @@ import yaml
 
 from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.main import main
+from exneat_cli.records import RunDirectory
 from exneat_cli.runs import RunSettings
 from exneat_cli.tasks import TASKS
 
@@ -86,6 +87,34 @@ def test_a_saved_configuration_trains_the_same_run_elsewhere(tmp_path: Path) -> 
 def test_a_multirun_trains_every_combination(tmp_path: Path) -> None:
     assert train("-m", f"output={tmp_path}", "algorithm=random", "seed=0,1", "noise.sensor_std=0,0.1") == 0
     assert len(list((tmp_path / "ant").iterdir())) == 4
+
+
+def test_a_repeated_multirun_goes_on_with_what_is_unfinished_and_leaves_the_rest(tmp_path: Path) -> None:
+    arguments = ("-m", f"output={tmp_path}", "task=track_maze", "seed=0,1")
+    quick = ("budget=smoke", "test_episodes=1", "validation_episodes=1")
+    assert main(["train", *quick, *arguments]) == 0
+    first, second = sorted((tmp_path / "track_maze").iterdir())
+    champions = [(run / "champion.json").read_bytes() for run in (first, second)]
+    untouched = (first / "manifest.json").stat().st_mtime_ns
+    manifest = json.loads((second / "manifest.json").read_text())
+    (second / "manifest.json").write_text(json.dumps({**manifest, "status": "running"}))
+    (second / "champion.json").unlink()
+    assert main(["train", *quick, *arguments]) == 0
+    assert [(run / "champion.json").read_bytes() for run in (first, second)] == champions
+    assert (first / "manifest.json").stat().st_mtime_ns == untouched
+    assert len(json.loads((second / "manifest.json").read_text())["resumed"]) == 1
+
+
+def test_inspect_calls_a_run_killed_whose_process_is_gone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert train(f"output={tmp_path}") == 0
+    run = RunDirectory(the_run(tmp_path))
+    run.update_manifest(status="running")
+    capfd.readouterr()
+    assert main(["inspect", f"output={tmp_path}"]) == 0
+    assert capfd.readouterr().out.splitlines()[1].startswith("killed ")
+    with run.held():
+        assert main(["inspect", f"output={tmp_path}"]) == 0
+    assert capfd.readouterr().out.splitlines()[1].startswith("running ")
 
 
 def test_inspect_shows_sensors_joints_and_sizes_of_every_module(
