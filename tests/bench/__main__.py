@@ -22,6 +22,8 @@ from tests.bench.evolution_growth import (
 )
 from tests.bench.evolution_speed import INITIAL_CONNECTIONS, compare_with_stock
 from tests.bench.generation_cost import ARMS, compare_with_physics
+from tests.bench.generation_parts import ARMS as DISSECTED_ARMS
+from tests.bench.generation_parts import measure_parts
 from tests.bench.grid_worlds import (
     PAPER_ALGORITHMS,
     PAPER_TASKS,
@@ -97,7 +99,11 @@ def _evolution(options: argparse.Namespace) -> Pieces:
 
 
 def _generation(options: argparse.Namespace) -> Pieces:
-    return {f"whole generations, {arm}": partial(_one, partial(compare_with_physics, arm)) for arm in ARMS}
+    whole: Pieces = {f"whole generations, {arm}": partial(_one, partial(compare_with_physics, arm)) for arm in ARMS}
+    return whole | {
+        f"parts of a generation, {arm}, {genome} genomes": partial(measure_parts, arm, genome)
+        for arm, genome in product(DISSECTED_ARMS, ("array", "stock"))
+    }
 
 
 def _training(options: argparse.Namespace) -> Pieces:
