@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.records import DONE, RunDirectory, merge_robustness, read_champion, read_robustness, read_yaml
-from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
+from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
 from exneat_cli.runs.run import MANIFEST_FORMAT
 from exneat_cli.runs.scores import baseline, robustness_row, score_all, unseen_episodes
@@ -75,6 +75,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
                 raise ConfigError(key, expected, came, mend) from error
 
 
+@keep_clusters()
 def run_robustness(
     directory: RunDirectory,
     sweeps: Sequence[Sweep],
@@ -95,6 +96,7 @@ def run_robustness(
     Raises:
         ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
     """
+    executor.check_installed()
     settings = load_settings(directory)
     check_sweeps(settings, sweeps, episodes)
     done = 0
