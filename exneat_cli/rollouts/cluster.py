@@ -11,6 +11,7 @@ import logging
 import signal
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
 from typing import Any
@@ -22,6 +23,9 @@ CONNECT_SECONDS = 8
 """How long to wait for the scheduler at an address."""
 STOP_SECONDS = 1
 """How long a worker process of our own may take to stop by itself: it has nothing to save."""
+
+DEAD_SECONDS = 3.0
+"""dask starts a worker that died again at once, unless it died while it started."""
 
 _lock = threading.RLock()
 _open: dict[Executor, Cluster] = {}
@@ -43,6 +47,9 @@ class Cluster:
         from distributed.utils import silence_logging_cmgr
 
         self._ending = contextlib.ExitStack()
+        self._own: Any = None
+        self._own_workers = executor.threads
+        self._dead_since: dict[Any, float] = {}
         # What goes wrong is said by us, once; dask would add pages.
         self._ending.enter_context(silence_logging_cmgr(logging.CRITICAL))
         try:
@@ -62,6 +69,24 @@ class Cluster:
             return sum(self.client.nthreads().values()) if self.usable else 0
         except (OSError, asyncio.CancelledError):
             return 0
+
+    def mend(self) -> None:
+        """Start those workers of our own again that dask has given up."""
+        if self._own is None or not self.usable:
+            return
+
+        async def drop_dead() -> None:
+            now = time.monotonic()
+            for name, nanny in list(self._own.workers.items()):
+                if nanny.is_alive():
+                    self._dead_since.pop(name, None)
+                elif now - self._dead_since.setdefault(name, now) > DEAD_SECONDS:
+                    del self._own.workers[name], self._dead_since[name]
+                    with contextlib.suppress(Exception):  # whatever is wrong with it, another one takes its place
+                        await nanny.close(timeout=STOP_SECONDS)
+
+        self._own.sync(drop_dead)
+        self._own.scale(self._own_workers)
 
     def close(self) -> None:
         """Leave the cluster; workers that were started for it are ended, with their files."""
@@ -121,6 +146,7 @@ class Cluster:
         client = Client(cluster, set_as_default=False)
         self._ending.callback(client.close)
         cluster.scale(workers)
+        self._own = cluster
         return client
 
 

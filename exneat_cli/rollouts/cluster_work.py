@@ -163,6 +163,8 @@ class _UnderWay:
     def _look_for_workers(self) -> None:
         self._threads = self._cluster.threads()
         now = time.monotonic()
+        if not self._executor.address and self._threads < self._executor.threads:
+            self._cluster.mend()
         if self._threads:
             self._workers_seen = now
         elif now - self._workers_seen > PATIENCE_SECONDS:
