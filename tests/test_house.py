@@ -19,6 +19,7 @@ FENCES = {
     "neat": {"evolution", "brains"},
     "matplotlib": {"analysis"},
     "dask": {"rollouts"},
+    "distributed": {"rollouts"},
 }
 
 

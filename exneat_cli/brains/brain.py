@@ -84,6 +84,29 @@ class Brains(NamedTuple):
         recurrent = bool(self.recurrent[0])
         return Brain(**{**own, "size": int(self.size[0]), "recurrent": recurrent, "output_slot": self.output_slot[0]})
 
+    def part(self, first: int, last: int) -> Brains:
+        """Those from `first` to before `last`, counted from 0 again; their arrays are views where they can be."""
+        nodes = slice(int(self.first_node[first]), int(self.first_node[last]))
+        links = slice(int(self.first_link[first]), int(self.first_link[last]))
+        edges = slice(int(self.edge_start[nodes.start]), int(self.edge_start[nodes.stop]))
+        return Brains(
+            observation_size=self.observation_size,
+            size=self.size[first:last],
+            recurrent=self.recurrent[first:last],
+            first_node=self.first_node[first : last + 1] - nodes.start,
+            first_link=self.first_link[first : last + 1] - links.start,
+            node_slot=self.node_slot[nodes],
+            edge_start=self.edge_start[nodes.start : nodes.stop + 1] - edges.start,
+            edge_source=self.edge_source[edges],
+            edge_weight=self.edge_weight[edges],
+            bias=self.bias[nodes],
+            response=self.response[nodes],
+            activation=self.activation[nodes],
+            link_slot=self.link_slot[links],
+            link_source=self.link_source[links],
+            output_slot=self.output_slot[first:last],
+        )
+
 
 def lay_out(brains: Sequence[Brain]) -> Brains:
     """All of `brains` end to end.

@@ -19,6 +19,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 import exneat_cli
 from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
 # Hydra would otherwise make a directory of its own per run, write its files into it and open a log there.
@@ -81,7 +82,8 @@ def run_composed(
     flags, overrides = _flags_first(program, arguments)
     directory = str(configuration_directory())
     try:
-        with tempfile.TemporaryDirectory() as scratch:
+        # Jobs that are done one after the other share a cluster: starting one takes seconds.
+        with tempfile.TemporaryDirectory() as scratch, keep_clusters():
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
             hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
     except Exception as error:

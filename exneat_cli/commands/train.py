@@ -29,9 +29,11 @@ def run(arguments: Sequence[str]) -> int:
             _train(config, arguments)
         except ExneatError as error:
             if HydraConfig.get().mode is RunMode.MULTIRUN:
-                # Raised again at the end of the multirun by Hydra, also where jobs run in other processes.
+                # Raised again at the end of the multirun by Hydra, with its reason: what a job prints on another
+                # machine stays in a log there.
                 print(f"exneat: {' '.join(HydraConfig.get().overrides.task)}: {error}", file=sys.stderr)
-                raise ExneatError("at least one job of the multirun failed; see above") from error
+                reason = str(error).splitlines()[0]
+                raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}") from error
             raise
 
     run_composed("exneat train", arguments, job)

@@ -1,7 +1,21 @@
 """The hot room: runs episodes and returns what came out of them; writes nothing."""
 
+from exneat_cli.rollouts.cluster import keep_clusters
+from exneat_cli.rollouts.executor import EXECUTORS, Executor
 from exneat_cli.rollouts.noise import Noise
+from exneat_cli.rollouts.outcomes import Outcomes, Trace
 from exneat_cli.rollouts.robustness import Sweep, perturbed, run_levels
-from exneat_cli.rollouts.runner import EXECUTORS, Executor, Outcomes, Runner, Trace
+from exneat_cli.rollouts.runner import Runner
 
-__all__ = ["EXECUTORS", "Executor", "Noise", "Outcomes", "Runner", "Sweep", "Trace", "perturbed", "run_levels"]
+__all__ = [
+    "EXECUTORS",
+    "Executor",
+    "Noise",
+    "Outcomes",
+    "Runner",
+    "Sweep",
+    "Trace",
+    "keep_clusters",
+    "perturbed",
+    "run_levels",
+]

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.errors import ConfigError
+from exneat_cli.rollouts.executor import Executor
 from exneat_cli.rollouts.noise import Noise
-from exneat_cli.rollouts.runner import Executor, Outcomes, Runner
+from exneat_cli.rollouts.outcomes import Outcomes
+from exneat_cli.rollouts.runner import Runner
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
 

@@ -19,7 +19,7 @@ from exneat_cli.records import (
     read_robustness,
     read_yaml,
 )
-from exneat_cli.rollouts import Executor, Sweep, perturbed, run_levels
+from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
 from exneat_cli.runs.scores import baseline, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
@@ -89,6 +89,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
                 raise ConfigError(key, expected, came, mend) from error
 
 
+@keep_clusters()
 def run_robustness(
     directory: RunDirectory,
     sweeps: Sequence[Sweep],
@@ -109,6 +110,7 @@ def run_robustness(
     Raises:
         ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
     """
+    executor.check_installed()
     settings = load_settings(directory)
     check_sweeps(settings, sweeps, episodes)
     done = 0

@@ -36,7 +36,7 @@ from exneat_cli.records import (
     write_hall_of_fame,
     write_history,
 )
-from exneat_cli.rollouts import Runner, Trace
+from exneat_cli.rollouts import Runner, Trace, keep_clusters
 from exneat_cli.runs.progress import Progress, Silence
 from exneat_cli.runs.scores import baseline, robustness_row, score_all, score_brains, summary_sentence, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
@@ -62,6 +62,7 @@ class Finished:
     trained_now: bool
 
 
+@keep_clusters()
 def train(settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = ()) -> Finished:
     """Do one run, or find it done.
 
@@ -73,6 +74,7 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
     Raises:
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
+    settings.executor.check_installed()
     directory = settings.directory
     with directory.claimed(settings.full_hash, settings.to_plain(), resume=settings.resume) as claim:
         if claim is not Claim.FINISHED:

@@ -25,18 +25,24 @@ _CACHE_SET_UP = threading.Lock()
 
 
 @functools.cache
-def cache_directory() -> Path | None:
-    """Where compiled code is kept, or None where nothing can be written.
-
-    Below ``NUMBA_CACHE_DIR`` if that is set, else ``$XDG_CACHE_HOME/exneat``, else ``~/.cache/exneat``.
-    """
+def source_digest() -> str:
+    """Hexadecimal digest of all files that are compiled together, and of NumPy's version."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256(version("numpy").encode())
     for room in _COMPILED_ROOMS:
         for path in sorted((package / room).glob("*.py")):
             digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@functools.cache
+def cache_directory() -> Path | None:
+    """Where compiled code is kept, or None where nothing can be written.
+
+    Below ``NUMBA_CACHE_DIR`` if that is set, else ``$XDG_CACHE_HOME/exneat``, else ``~/.cache/exneat``.
+    """
     try:
-        directory = cache_root() / digest.hexdigest()[:16]
+        directory = cache_root() / source_digest()[:16]
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):  # RuntimeError: a user without a home directory
         return None
