@@ -61,6 +61,6 @@ def test_only_what_is_missing_is_tested_and_workers_do_not_matter(tmp_path: Path
 def test_a_run_that_another_process_holds_is_refused(tmp_path: Path) -> None:
     directory = train(a_run(tmp_path)).directory
     sweep = Sweep("p_m", "task.p_m", (0.0,))
-    with directory.held(), pytest.raises(ExneatError, match="another process is writing this run"):
+    with directory.held(), pytest.raises(ExneatError, match="another process is writing there"):
         run_robustness(directory, [sweep], episodes=2, executor=SERIAL)
     assert not directory.robustness.exists()
