@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import read_json, write_json, write_whole
+from exneat_cli.records.files import write_json, write_whole
+from exneat_cli.records.manifest_data import read_manifest_data, result_of
 
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
 """What a manifest's status can be."""
@@ -199,7 +200,15 @@ class RunDirectory:
         Raises:
             ExneatError: it is missing or damaged.
         """
-        return read_json(self.manifest)
+        return read_manifest_data(self.manifest)
+
+    def read_result(self) -> dict[str, Any]:
+        """The result in the manifest of a finished run.
+
+        Raises:
+            ExneatError: it is missing or damaged.
+        """
+        return result_of(self.manifest, self.read_manifest())
 
     def update_manifest(self, **changes: object) -> None:
         """Replace or add entries of the manifest.

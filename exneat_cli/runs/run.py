@@ -72,7 +72,7 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
     with directory.claimed(settings.full_hash, resume=settings.resume) as to_be_done:
         if to_be_done:
             _train_in(directory, settings, progress or Silence(), command)
-        result = directory.read_manifest()["result"]
+        result = directory.read_result()
     return Finished(directory, result, summary_sentence(settings.task, result), trained_now=to_be_done)
 
 
