@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_real, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_real, check_whole, shortened
 from exneat_cli.evolution.genes import ACTIVATIONS
 from exneat_cli.records.files import read_json
 from exneat_cli.wiring import Module, Pin, Plan
@@ -30,8 +30,9 @@ def read_champion_data(path: Path) -> dict[str, Any]:
         ExneatError: the file is missing or damaged, of another format, or a field is missing, unknown or unusable.
     """
     content = read_json(path)
-    if content.get("format") != FORMAT:
-        raise ExneatError(f"{path}: expected a champion of format {FORMAT}, got {content.get('format')!r}")
+    kind = content.get("format")
+    if kind != FORMAT or isinstance(kind, bool):
+        raise ExneatError(f"{path}: expected a champion of format {FORMAT}, got {shortened(kind)}")
     try:
         _check_fields("", content, _FIELDS)
         _check_word("arm", content["arm"])
@@ -80,7 +81,9 @@ def _check_fields(key: str, value: object, names: Sequence[str]) -> None:
             raise ValueError(f"{key}{'.' if key else ''}{name} is missing")
     for name in value:
         if name not in names:
-            raise ValueError(f"{key}{'.' if key else ''}{ascii(name)[1:61]}: unknown field; known: {', '.join(names)}")
+            raise ValueError(
+                f"{key}{'.' if key else ''}{ascii(name)[1:-1][:60]}: unknown field; known: {', '.join(names)}"
+            )
 
 
 def _check_list(key: str, value: object, low: int = 0) -> Iterable[tuple[str, Any]]:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from exneat_cli.brains.brain import Brain, activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import EvolutionSettings, Population
+from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.records import Champion, read_champion, write_champion
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry, Wiring, plan_wiring
@@ -29,14 +29,16 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A champion with links and a central module, as data."""
     task = AntTask()
     plan = plan_wiring(task, "exneat", Geometry("lr"), "full", Wiring(), hidden=2)
-    team = Population(EvolutionSettings(module_hidden=2), plan.subpopulation_shapes, 4, seed=0).ask()[0]
+    configs = [neat_config(EvolutionSettings(), 4, shape) for shape in plan.subpopulation_shapes]
+    seeds = np.random.SeedSequence(0).spawn(len(configs) + 1)
+    team = Coevolution(configs, seeds[1:], seeds[0]).ask()[0]
     test = {"fitness_mean": 1.0, "fitness_std": 0.5, "episodes": 3}
     scores = {"training": {"fitness": 1.0}, "validation": {"fitness_mean": 1.0}, "test": test}
     arm, names = "exneat-lr-full", task.actuator_names
     champion = Champion(arm, {"name": "ant"}, names, True, plan, tuple(team.genomes), scores)
     path = tmp_path_factory.mktemp("sound") / "champion.json"
     write_champion(path, champion)
-    assert read_champion(path) == champion or read_champion(path).plan == plan
+    assert read_champion(path).plan == plan
     content: dict[str, Any] = json.loads(path.read_text())
     return content
 
@@ -97,7 +99,7 @@ JSON = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_is_changed_in_a_champion_it_is_refused_or_stays_within_its_memory(
     data: st.DataObject, sound: dict[str, Any], tmp_path: Path
@@ -120,12 +122,15 @@ def test_whatever_is_changed_in_a_champion_it_is_refused_or_stays_within_its_mem
             inside[place[-1]] += data.draw(st.sampled_from([-2, -1, 1, 2, 100]))
         else:
             inside[place[-1]] = data.draw(JSON)
+    champion, refusal = None, ""
     try:
         champion = read(tmp_path, content)
     except ExneatError as error:
-        assert "champion.json: " in str(error)
-        assert len(str(error).splitlines()) <= 2
-        assert str(error).replace("\n", "").isprintable()
+        refusal = str(error)
+    if champion is None:
+        assert "champion.json: " in refusal
+        assert len(refusal.splitlines()) <= 2
+        assert refusal.replace("\n", "").isprintable()
         return
     brain = champion.brain()
     check_sizes(brain)
@@ -140,7 +145,7 @@ DAMAGES: list[tuple[Place, Any, str]] = [
     (("plan", "wurst"), 1, "plan.wurst: unknown field"),
     (("genomes", 0, "nodes", 0, "wurst"), 1, r"genomes\[0\]\.nodes\[0\]\.wurst: unknown field"),
     (("format",), 2, "format 1, got 2"),
-    (("format",), True, "damaged|format"),
+    (("format",), True, "format 1, got True"),
     (("feed_forward",), 1, "feed_forward: expected true or false, got 1"),
     (("arm",), "\x1b[31mred", "arm: expected a word"),
     (("actuators", 0), "a\nb", r"actuators\[0\]: expected a word"),
@@ -177,12 +182,12 @@ DAMAGES: list[tuple[Place, Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("place", "value", "named"), DAMAGES, ids=[f"{place[-3:]}={value!r}"[:50] for place, value, _ in DAMAGES])
+@pytest.mark.parametrize(
+    ("place", "value", "named"), DAMAGES, ids=[f"{place[-3:]}={value!r}"[:50] for place, value, _ in DAMAGES]
+)
 def test_a_field_that_makes_no_sense_is_named(
     place: Place, value: Any, named: str, sound: dict[str, Any], tmp_path: Path
 ) -> None:
-    if named.startswith("damaged|"):
-        pytest.skip("true equals 1")
     with pytest.raises(ExneatError, match=rf"champion\.json: .*({named})"):
         read(tmp_path, changed(sound, place, value))
 
