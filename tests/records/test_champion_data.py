@@ -150,7 +150,7 @@ DAMAGES: list[tuple[Place, Any, str]] = [
     (("arm",), "\x1b[31mred", "arm: expected a word"),
     (("actuators", 0), "a\nb", r"actuators\[0\]: expected a word"),
     (("actuators",), "abcdefgh", "actuators: expected a list"),
-    (("task",), {}, "task: expected the task's parameters"),
+    (("task",), [], "task: expected the task's parameters"),
     (("task", "size"), 10**400, "task.size: expected a number"),
     (("scores", "test", "fitness_mean"), None, "scores.test.fitness_mean: expected a number"),
     (("scores", "test"), {}, "scores.test: expected figures"),
