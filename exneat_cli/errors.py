@@ -7,7 +7,11 @@ lines; `exneat_cli.main` prints it without a traceback and exits with code 2.
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Sequence
+from typing import Any
+
+_LONGEST_VALUE = 160
 
 
 class ExneatError(Exception):
@@ -30,8 +34,37 @@ class ConfigError(ExneatError):
 
     def __str__(self) -> str:
         key, expected, came, mend = self.args
-        message = f"{key}: expected {expected}, got {came!r}"
+        message = f"{key}: expected {expected}, got {shortened(came)}"
         return f"{message}\n  {mend}" if mend else message
+
+
+def shortened(value: object) -> str:
+    """A value in Python's words, cut to what fits on a line or two.
+
+    A value that came through YAML aliases may be a few bytes on disk and gigabytes in words.
+    """
+    try:
+        text = _Words().repr(value)
+    except ValueError:  # an integer of thousands of digits has no words
+        text = f"a value of type {type(value).__name__} with thousands of digits"
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
+
+
+class _Words(reprlib.Repr):
+    """Names a list's or section's first entries alone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = self.maxlong = _LONGEST_VALUE
+        self.maxlist = self.maxtuple = self.maxdict = 20
+        self.maxlevel = 3
+
+    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
+        """In the order given, where `reprlib` would sort, which fails on keys of several types."""
+        if level <= 0 or not x:
+            return "{...}" if x else "{}"
+        parts = [f"{self.repr1(key, 0)}: {self.repr1(x[key], level - 1)}" for key in list(x)[: self.maxdict]]
+        return "{" + ", ".join([*parts, "..."] if len(x) > self.maxdict else parts) + "}"
 
 
 def check_whole(key: str, value: object, low: int, high: int | None = None) -> None:
@@ -56,8 +89,16 @@ def check_real(key: str, value: object, low: float, high: float = math.inf) -> N
     bounds = f"a number of at least {low:g}" if high == math.inf else f"a number from {low:g} to {high:g}"
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise ConfigError(key, bounds, value)
-    if not math.isfinite(value) or value < low or value > high:
+    if not is_finite(value) or value < low or value > high:
         raise ConfigError(key, bounds, value)
+
+
+def is_finite(value: float) -> bool:
+    """Whether a number is finite as a double: Python's whole numbers can be larger than any."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def check_flag(key: str, value: object) -> None:

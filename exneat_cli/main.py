@@ -51,6 +51,11 @@ usage: exneat <command> [key=value ...]
 """
 
 
+def _printable(message: str) -> str:
+    """The message with control characters spelled out: what a stranger wrote must not steer the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in message)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code.
 
@@ -76,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
         return code
     except ExneatError as error:
-        print(f"exneat: {error}", file=sys.stderr)
+        print(f"exneat: {_printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
         print("exneat: interrupted; the same command goes on (a single exneat train with resume=true)", file=sys.stderr)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, plan_from_data, read_json
+from exneat_cli.records import RunDirectory, plan_from_data, read_champion_data
 from exneat_cli.wiring import Plan
 
 Node = tuple[int, int]
@@ -63,7 +63,7 @@ def read_champion_graph(run: RunDirectory) -> ChampionGraph:
     """
     if not run.champion.exists():
         raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
-    content = read_json(run.champion)
+    content = read_champion_data(run.champion)
     try:
         return champion_graph(content)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:

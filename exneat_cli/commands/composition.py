@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +17,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 import exneat_cli
+from exneat_cli.commands.complaints import in_our_words
+from exneat_cli.commands.overrides import check_overrides
+from exneat_cli.commands.own_files import check_own_files, without_marks
 from exneat_cli.errors import ExneatError, check_choice
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
@@ -35,7 +37,6 @@ _FLAGS_WITH_VALUE = {
     *("--config-path", "-cp", "--config-name", "-cn", "--config-dir", "-cd"),
     *("--package", "-p", "--cfg", "-c", "--shell-completion", "-sc"),
 }
-_LONGEST_LINE = 300
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
 _NOT_OF_THE_RUN = ("budget", "budgets", "sweep", "sweeps")
@@ -81,15 +82,21 @@ def run_composed(
     os.environ["HYDRA_FULL_ERROR"] = "1"
     flags, overrides = _flags_first(program, arguments)
     directory = str(configuration_directory())
+    check_overrides(overrides, configuration_directory())
     try:
         # Jobs that are done one after the other share a cluster: starting one takes seconds.
         with tempfile.TemporaryDirectory() as scratch, keep_clusters():
+            flags = [without_marks(flag, Path(scratch)) for flag in flags]
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
             hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
+    except SystemExit as stop:
+        if stop.code:
+            raise ExneatError(f"{program}: the flags make no sense to Hydra, see {program} --hydra-help") from stop
+        raise
     except Exception as error:
         if error in raised:
             raise
-        raise ExneatError(_in_our_words(error)) from error
+        raise ExneatError(in_our_words(error, configuration_directory())) from error
     if raised:
         raise raised[0]
 
@@ -114,7 +121,7 @@ def plain_from(config: DictConfig) -> dict[str, Any]:
     try:
         plain = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
     except OmegaConfBaseException as error:
-        raise ExneatError(_in_our_words(error)) from error
+        raise ExneatError(in_our_words(error, configuration_directory())) from error
     assert isinstance(plain, dict)
     return {str(key): value for key, value in plain.items()}
 
@@ -128,10 +135,11 @@ def composing() -> Iterator[Callable[[Sequence[str]], DictConfig]]:
     """
 
     def compose_one(overrides: Sequence[str]) -> DictConfig:
+        check_overrides(overrides, configuration_directory())
         try:
             return hydra.compose("config", overrides=list(overrides))
         except Exception as error:
-            raise ExneatError(_in_our_words(error)) from error
+            raise ExneatError(in_our_words(error, configuration_directory())) from error
 
     with hydra.initialize_config_dir(str(configuration_directory()), version_base="1.3"):
         yield compose_one
@@ -163,19 +171,14 @@ def _checked_flag(name: str, value: str) -> str:
     if name in ("--cfg", "-c"):
         check_choice(name, value, ("job", "hydra", "all"))
     if name in ("--config-path", "-cp"):
-        return str(Path(value).absolute())
+        directory = Path(value).absolute()
+        check_own_files(directory, None)
+        return str(directory)
     if name in ("--config-dir", "-cd"):
-        _refuse_shadowed_files(Path(value))
+        directory = Path(value).absolute()
+        check_own_files(directory, configuration_directory())
+        return str(directory)
     return value
-
-
-def _refuse_shadowed_files(directory: Path) -> None:
-    """Hydra silently prefers a packaged file to a user's of the same name."""
-    packaged = configuration_directory()
-    for path in sorted(directory.rglob("*.yaml")):
-        name = path.relative_to(directory)
-        if (packaged / name).exists():
-            raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
 
 
 def _check_budgets(budgets: object) -> None:
@@ -184,26 +187,3 @@ def _check_budgets(budgets: object) -> None:
         check_choice(f"budgets.{name}", name, BUDGETS)
         for key in budget if isinstance(budget, dict) else ():
             check_choice(f"budgets.{name}.{key}", key, sorted(fields))
-
-
-def _in_our_words(error: Exception) -> str:
-    text = str(error) or type(error).__name__
-    if unknown := re.match(r"Could not override '(.+?)'", text):
-        return f"{unknown[1]}: unknown key; exneat train --help lists all of them"
-    if unknown := re.search(r"Could not find '(.+)/(.+?)'", text):
-        options = re.search(r"Available options in '.+':\n((?:\t.+\n?)+)", text)
-        known = ", ".join(options[1].split()) if options else "none"
-        return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
-    if unknown := re.search(r"Could not load '(.+)/(.+?)'", text):
-        known = ", ".join(sorted(path.stem for path in (configuration_directory() / unknown[1]).glob("*.yaml")))
-        return f"{unknown[1]}={unknown[2]}: no such option; known: {known}"
-    if dangling := re.search(r"Interpolation key '(.+?)' not found\s+full_key: (\S+)", text):
-        return f"{dangling[2]}: refers to {dangling[1]}, which no configuration file and no override sets"
-    if loaded := re.match(r"Invalid loaded object type: (\w+)", text):
-        return f"a configuration file holds {loaded[1]}, expected keys with values"
-    if isinstance(error, UnicodeDecodeError):
-        return f"a configuration file is not UTF-8 text: {text}"
-    cause = error.__cause__
-    lines = [line.strip() for line in f"{text}\n{cause or ''}".splitlines() if line.strip()]
-    kept = [lines[0], " ".join(lines[1:])] if len(lines) > 3 else lines
-    return "\n  ".join(line[:_LONGEST_LINE] for line in kept)

@@ -13,9 +13,10 @@ from pathlib import Path
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from exneat_cli.commands.composition import run_composed
+from exneat_cli.commands.composition import configuration_directory, run_composed
 from exneat_cli.commands.drawing import draw_what_is_missing
 from exneat_cli.commands.experiments import Experiment, Job, budget_of, plan_jobs, read_experiment
+from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import DONE
 from exneat_cli.runs import Silence, progress_for_terminal, run_robustness, train
@@ -30,9 +31,10 @@ def run(arguments: Sequence[str]) -> int:
         ExneatError: the experiment or a setting makes no sense; nothing was run then.
     """
     name, for_hydra, overrides = _sorted_arguments(arguments)
+    check_overrides(for_hydra, configuration_directory())
     experiment = read_experiment(name)
     chosen, overrides = budget_of(overrides)
-    budget = chosen or "quick"
+    budget = "quick" if chosen is None else chosen
     jobs = plan_jobs(experiment, budget, overrides)
     pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     done_before = len(jobs) - len(pending)

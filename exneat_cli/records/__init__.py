@@ -1,9 +1,10 @@
 """Everything on disk: layout, columns, champions, manifests."""
 
 from exneat_cli.records import disk, provenance
-from exneat_cli.records.champion import Champion, plan_from_data, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.champion_data import plan_from_data, read_champion_data
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
-from exneat_cli.records.files import make_directory, read_json, read_yaml, write_csv, write_json, write_whole
+from exneat_cli.records.files import make_directory, read_json, read_text, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
 from exneat_cli.records.locks import is_held
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
@@ -18,6 +19,7 @@ from exneat_cli.records.run_directory import (
     configuration_hash,
     find_runs,
 )
+from exneat_cli.records.yaml_files import check_yaml, read_yaml
 
 __all__ = [
     "DONE",
@@ -32,6 +34,7 @@ __all__ = [
     "HistoryRow",
     "RobustnessRow",
     "RunDirectory",
+    "check_yaml",
     "configuration_hash",
     "disk",
     "find_runs",
@@ -41,9 +44,11 @@ __all__ = [
     "plan_from_data",
     "provenance",
     "read_champion",
+    "read_champion_data",
     "read_checkpoints",
     "read_json",
     "read_robustness",
+    "read_text",
     "read_yaml",
     "write_champion",
     "write_checkpoint",

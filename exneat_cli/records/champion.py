@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.brains import Brain, assemble
-from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import ArrayGenome, Entry, genome_from_data, genome_to_data
-from exneat_cli.records.files import read_json, write_json, write_whole
-from exneat_cli.wiring import Module, Pin, Plan
-
-FORMAT = 1
+from exneat_cli.records.champion_data import FORMAT, plan_from_data, read_champion_data
+from exneat_cli.records.files import write_json, write_whole
+from exneat_cli.wiring import Plan
 
 
 @dataclass(frozen=True)
@@ -67,35 +65,18 @@ def read_champion(path: Path) -> Champion:
     """Read a champion as data: nothing in the file is run.
 
     Raises:
-        ExneatError: the file is missing, damaged, or of another format.
+        ExneatError: see `read_champion_data`.
     """
-    content = read_json(path)
-    if content.get("format") != FORMAT:
-        raise ExneatError(f"{path}: expected a champion of format {FORMAT}, got {content.get('format')!r}")
-    try:
-        champion = Champion(
-            arm=str(content["arm"]),
-            task=dict(content["task"]),
-            actuators=tuple(content["actuators"]),
-            feed_forward=bool(content["feed_forward"]),
-            plan=plan_from_data(content["plan"]),
-            genomes=tuple(genome_from_data(genome) for genome in content["genomes"]),
-            scores=dict(content["scores"]),
-        )
-        _check(champion)
-        return champion
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        raise ExneatError(f"{path}: damaged: {type(error).__name__}: {error}") from error
-
-
-def _check(champion: Champion) -> None:
-    """Raise what `read_champion` turns into words if the parts do not fit together."""
-    champion.plan.check()
-    if len(champion.actuators) != champion.plan.action_size:
-        raise ValueError(f"names {len(champion.actuators)} actuators for {champion.plan.action_size}")
-    for figure in ("fitness_mean", "fitness_std", "episodes"):
-        float(champion.scores["test"][figure])
-    champion.brain()
+    content = read_champion_data(path)
+    return Champion(
+        arm=content["arm"],
+        task=content["task"],
+        actuators=tuple(content["actuators"]),
+        feed_forward=content["feed_forward"],
+        plan=plan_from_data(content["plan"]),
+        genomes=tuple(genome_from_data(genome) for genome in content["genomes"]),
+        scores=content["scores"],
+    )
 
 
 def write_hall_of_fame(path: Path, entries: Sequence[Entry], validation: Sequence[float]) -> None:
@@ -124,24 +105,3 @@ def write_hall_of_fame(path: Path, entries: Sequence[Entry], validation: Sequenc
         for rank, (entry, score) in enumerate(ranked, start=1)
     ]
     write_whole(path, "".join(line + "\n" for line in lines))
-
-
-def plan_from_data(data: dict[str, Any]) -> Plan:
-    """The plan in a champion file, as read from JSON; not checked.
-
-    Raises:
-        KeyError, TypeError, ValueError: a field is missing or of the wrong type.
-    """
-    modules = tuple(
-        Module(
-            name=module["name"],
-            position=(float(module["position"][0]), float(module["position"][1])),
-            subpopulation=module["subpopulation"],
-            pins=tuple(Pin(**pin) for pin in module["pins"]),
-            outputs=module["outputs"],
-            hidden=module["hidden"],
-            drives=tuple(module["drives"]),
-        )
-        for module in data["modules"]
-    )
-    return Plan(modules, int(data["observation_size"]), int(data["action_size"]))

@@ -6,15 +6,17 @@ import contextlib
 import csv
 import io
 import json
+import math
 import os
+import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import finishing
+
+_LARGEST_FILE = 64 * 1024**2
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -78,46 +80,70 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object
     write_whole(path, text.getvalue())
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """Refuses a key that comes twice, where plain YAML would drop the first one silently."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} comes twice", node.start_mark)
-        return super().construct_mapping(node, deep)
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Read keys with values from YAML, as data.
+def read_text(path: Path) -> str:
+    """The text of a file, without a byte order mark, lines ended by line feeds.
 
     Raises:
-        ExneatError: the file is missing, unreadable, no YAML, names a key twice, or holds something else.
+        ExneatError: it is missing, unreadable, no file (a directory, or a pipe that would never end), larger than
+            64 MiB, or not UTF-8.
     """
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
+        kind = path.stat()
+        if not stat.S_ISREG(kind.st_mode):
+            raise ExneatError(f"{path}: could not be read: expected a file, got {_kind_of(kind.st_mode)}")
+        if kind.st_size > _LARGEST_FILE:
+            raise ExneatError(f"{path}: expected at most {_LARGEST_FILE} bytes, got {kind.st_size}")
+        data = path.read_bytes()
     except OSError as error:
         raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ExneatError(f"{path}: expected YAML, got something else: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise ExneatError(f"{path}: expected keys with values, got {type(content).__name__}")
-    return content
+    except ValueError as error:
+        raise ExneatError(f"{str(path)!r}: could not be read: {error}") from error
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise ExneatError(f"{path}:{line}: expected UTF-8 text, got the byte {data[error.start]:#04x}") from error
+
+
+def _kind_of(mode: int) -> str:
+    return "a directory" if stat.S_ISDIR(mode) else "a pipe or device"
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """Read one JSON object.
 
     Raises:
-        ExneatError: the file is missing, unreadable, or no JSON object.
+        ExneatError: the file is missing, unreadable, or no JSON object; a key comes twice, or a number is not finite.
     """
+    text = read_text(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+        content = json.loads(
+            text, object_pairs_hook=_without_twins, parse_constant=_no_constant, parse_float=_finite_float
+        )
+    except RecursionError as error:
+        raise ExneatError(f"{path}: expected JSON, got something nested too deeply") from error
     except ValueError as error:
         raise ExneatError(f"{path}: expected JSON, got something else: {error}") from error
     if not isinstance(content, dict):
         raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
     return content
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twin = next(key for k, key in enumerate(keys) if key in keys[:k])
+        raise ValueError(f"the key {twin[:60]!r} comes twice")
+    return content
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is no number")
+
+
+def _finite_float(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"the number {text[:40]} is too large")
+    return number

@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, read_json, read_yaml, write_json, write_whole
+from exneat_cli.records.files import delete, write_json, write_whole
 from exneat_cli.records.locks import held
+from exneat_cli.records.manifest_data import read_manifest_data, result_of
+from exneat_cli.records.yaml_files import read_yaml
 
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
 """What a manifest's status can be."""
@@ -231,7 +233,15 @@ class RunDirectory:
         Raises:
             ExneatError: it is missing or damaged.
         """
-        return read_json(self.manifest)
+        return read_manifest_data(self.manifest)
+
+    def read_result(self) -> dict[str, Any]:
+        """The result in the manifest of a finished run.
+
+        Raises:
+            ExneatError: it is missing or damaged.
+        """
+        return result_of(self.manifest, self.read_manifest())
 
     def update_manifest(self, **changes: object) -> None:
         """Replace or add entries of the manifest.

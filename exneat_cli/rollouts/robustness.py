@@ -6,12 +6,11 @@ A perturbation is a setting of the task or of the noise, the very ones that trai
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from exneat_cli.brains import Brain, RandomActions
-from exneat_cli.errors import ConfigError
+from exneat_cli.errors import ConfigError, is_finite
 from exneat_cli.rollouts.executor import Executor
 from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Outcomes
@@ -42,7 +41,7 @@ class Sweep:
         if not self.levels:
             raise ConfigError("sweep.levels", f"at least one level of {self.parameter}", list(self.levels))
         for level in self.levels:
-            if isinstance(level, bool) or not isinstance(level, int | float) or not math.isfinite(level):
+            if isinstance(level, bool) or not isinstance(level, int | float) or not is_finite(level):
                 raise ConfigError("sweep.levels", f"finite numbers, levels of {self.parameter}", level)
         if len(set(self.levels)) < len(self.levels):
             raise ConfigError("sweep.levels", "levels that all differ", list(self.levels))

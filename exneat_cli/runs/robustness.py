@@ -41,7 +41,10 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     if manifest.get("status") != DONE:
         mend = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {mend}")
-    settings = RunSettings.from_plain(read_yaml(directory.config))
+    try:
+        settings = RunSettings.from_plain(read_yaml(directory.config))
+    except ConfigError as error:
+        raise ExneatError(f"{directory.config}: {error}") from error
     described = {"configuration_hash": settings.full_hash, "generations": settings.generations}
     if any(manifest.get(key) != value for key, value in described.items()):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
@@ -144,5 +147,7 @@ def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] |
         champion = read_champion(directory.champion)
         if champion.arm != settings.arm:
             raise ExneatError(f"{directory.champion}: expected a champion of {settings.arm}, got {champion.arm}")
+        if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
+            raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
         return [champion.brain()]
     return baseline(settings.task, settings.algorithm)

@@ -79,7 +79,7 @@ def train(settings: RunSettings, *, progress: Progress | None = None, command: S
     with directory.claimed(settings.full_hash, settings.to_plain(), resume=settings.resume) as claim:
         if claim is not Claim.FINISHED:
             _train_in(directory, settings, progress or Silence(), command)
-        result = directory.read_manifest()["result"]
+        result = directory.read_result()
     trained_now = claim is not Claim.FINISHED
     return Finished(directory, result, summary_sentence(settings.task, result), trained_now=trained_now)
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole, shortened
 from exneat_cli.evolution import PAIRINGS, RECURRENT, EvolutionSettings
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
@@ -80,8 +80,8 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
-        if not isinstance(self.output, str) or not self.output or "\0" in self.output:
-            raise ConfigError("output", "a directory", self.output)
+        if not isinstance(self.output, str) or not self.output or not self.output.isprintable():
+            raise ConfigError("output", "a directory, without control characters", self.output)
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             mend = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, mend)
@@ -177,5 +177,5 @@ def _build(part: type[_Part], values: Mapping[str, Any], prefix: str) -> _Part:
         if key not in known:
             close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
             hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
-            raise ExneatError(f"{prefix}{key}: unknown key (value {values[key]!r})\n  {hint}")
+            raise ExneatError(f"{prefix}{key}: unknown key (value {shortened(values[key])})\n  {hint}")
     return part(**values)

@@ -44,7 +44,7 @@ class Geometry:
             raise ConfigError("geometry.vector", expected, self.vector)
         if any(isinstance(entry, bool) or not isinstance(entry, int) or entry < 0 for entry in self.vector):
             raise ConfigError("geometry.vector", expected, list(self.vector))
-        if set(self.vector) != set(range(max(self.vector) + 1)):
+        if len(set(self.vector)) <= max(self.vector):
             raise ConfigError("geometry.vector", expected, list(self.vector))
         object.__setattr__(self, "vector", tuple(self.vector))
 

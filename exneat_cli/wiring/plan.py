@@ -89,12 +89,17 @@ class Plan:
         """Refuse a plan that points outside of itself, as a damaged file's might.
 
         Raises:
-            ValueError: a pin, an actuator or a subpopulation does not exist.
+            ValueError: a pin, an actuator or a subpopulation does not exist, an actuator is driven twice, or modules
+                that share genomes differ in size.
         """
         subpopulations = {module.subpopulation for module in self.modules}
         if subpopulations != set(range(len(subpopulations))):
             raise ValueError(f"subpopulations are not numbered without gaps: {sorted(subpopulations)}")
+        actuators = [actuator for module in self.modules for actuator in module.drives]
+        if len(set(actuators)) < len(actuators):
+            raise ValueError("two outputs drive the same actuator")
         for module in self.modules:
+            self._check_sharers(module)
             if not all(0 <= actuator < self.action_size for actuator in module.drives):
                 raise ValueError(f"{module.name} drives an actuator that does not exist: {module.drives}")
             if len(module.drives) > module.outputs:
@@ -102,6 +107,15 @@ class Plan:
             for pin in module.pins:
                 if not 0 <= pin.index < self._readable(pin):
                     raise ValueError(f"{module.name} has a pin that reads what does not exist: {pin}")
+
+    def _check_sharers(self, module: Module) -> None:
+        """Compiled brains size a network by one of the modules that share its genome: the others must agree."""
+        for m, other in enumerate(self.modules):
+            if other.subpopulation != module.subpopulation:
+                continue
+            alike = self.hidden_is_linked(m) == self.hidden_is_linked(self.modules.index(module))
+            if other.shape != module.shape or not alike:
+                raise ValueError(f"{module.name} and {other.name} share genomes, but not numbers of pins and nodes")
 
     def _readable(self, pin: Pin) -> int:
         if pin.kind == "sensor":

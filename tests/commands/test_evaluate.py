@@ -150,7 +150,7 @@ def spoil_manifest(run: RunDirectory, **entries: object) -> None:
         (lambda run: spoil_manifest(run, status="running"), "expected a finished run, got status 'running'"),
         (lambda run: spoil_manifest(run, configuration_hash="0"), "does not describe the run beside it"),
         (lambda run: run.manifest.write_text("{"), "expected JSON"),
-        (lambda run: run.config.write_text("[1]"), "expected keys with values, got list"),
+        (lambda run: run.config.write_text("[1]"), "expected keys with values, got a list"),
         (lambda run: run.config.write_text("a: [\t"), "expected YAML"),
         (lambda run: run.config.unlink(), "could not be read"),
         (lambda run: run.champion.unlink(), "could not be read"),

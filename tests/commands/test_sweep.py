@@ -266,7 +266,7 @@ def test_an_experiment_that_makes_no_sense_is_refused_before_anything_runs(
         ([], "experiment: expected a name or a YAML file"),
         (["experiment=chess"], "experiment: expected one of ant, foraging"),
         (["experiment=ant", "seed=0,1"], "a sweep runs seeds of its own"),
-        (["experiment=ant", "noise=5"], "Config group override must be a string"),
+        (["experiment=ant", "noise=5"], "noise: expected the name of an option, got 5"),
         (["experiment=ant", "=5"], "=5: unknown flag"),
         (["experiment=nowhere.yaml"], "could not be read"),
         (["experiment=ant", "budget=huge"], "budget: expected one that ant has runs for"),

@@ -72,7 +72,7 @@ def test_history_has_the_columns_of_the_design(tmp_path: Path) -> None:
 def test_what_is_no_json_object_is_refused_by_name(tmp_path: Path, content: str) -> None:
     path = tmp_path / "manifest.json"
     path.write_text(content, encoding="latin-1")
-    with pytest.raises(ExneatError, match=r"manifest\.json: expected"):
+    with pytest.raises(ExneatError, match=r"manifest\.json(:1)?: expected"):
         read_json(path)
 
 
