@@ -11,8 +11,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.analysis.figures import new_figure, save_figure, style, tick_levels
-from exneat_cli.records import UNPERTURBED, RunDirectory
+from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
@@ -27,7 +28,7 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
         run: whose history.csv is drawn.
         fitness_name: label of the vertical axis, e.g. ``forward reward``.
     """
-    history = pd.read_csv(run.history)
+    history = read_csv(run.history, HistoryRow._fields)
     curves = {
         "best_so_far": ("best so far", "#222222", 1.2, "--"),
         "best_fitness": ("best of the generation", "#0072b2", 1.8, "-"),
@@ -51,9 +52,9 @@ def draw_path(run: RunDirectory) -> list[Path]:
     In a grid world: its path over the tiles and their cues, and the paths of prey. Elsewhere: its path over
     the ground, coloured by time.
     """
-    trace = pd.read_csv(run.trace)
+    trace = read_csv(run.trace)
     if run.tiles.exists():
-        return _draw_on_tiles(run, trace, pd.read_csv(run.tiles))
+        return _draw_on_tiles(run, trace, read_csv(run.tiles))
     with style():
         figure = new_figure(7.0, 3.6)
         axes = figure.add_subplot()
@@ -77,7 +78,7 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
         labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
         fitness_name: label of the vertical axes, e.g. ``forward reward``.
     """
-    rows = pd.read_csv(run.robustness).sort_values(["parameter", "level", "episodes"])
+    rows = read_csv(run.robustness, RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
     rows = rows.drop_duplicates(["parameter", "level"], keep="last")
     sweeps = [name for name in dict.fromkeys(rows["parameter"]) if name != UNPERTURBED]
     if not sweeps:

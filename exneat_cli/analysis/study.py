@@ -13,8 +13,9 @@ from typing import Any
 
 import pandas as pd
 
+from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, RunDirectory
+from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory
 
 
 class MissingRunsError(ExneatError):
@@ -102,7 +103,7 @@ class Study:
 
     def history(self, condition: str, arm: str) -> pd.DataFrame:
         """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
-        return _stacked([(run, pd.read_csv(run.directory.history)) for run in self.of(condition, arm)])
+        return _stacked([(run, read_csv(run.directory.history, HistoryRow._fields)) for run in self.of(condition, arm)])
 
     def robustness(self, condition: str, arm: str) -> pd.DataFrame:
         """The planned rows of robustness.csv of all finished runs, with a column ``seed``; may be empty.
@@ -110,7 +111,7 @@ class Study:
         Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
         """
         runs = [run for run in self.of(condition, arm) if run.directory.robustness.exists()]
-        table = _stacked([(run, pd.read_csv(run.directory.robustness)) for run in runs])
+        table = _stacked([(run, read_csv(run.directory.robustness, RobustnessRow._fields)) for run in runs])
         return table if table.empty else table[self._is_planned(table)].reset_index(drop=True)
 
     def _is_planned(self, table: pd.DataFrame) -> pd.Series[bool]:

@@ -79,7 +79,7 @@ def finish(run: RunDirectory, arm: str, seed: int, height: float, generations: i
     ]
     write_history(run.history, rows)
     write_json(run.champion, grid_champion() if arm == "neat" else modular_champion())
-    scores = {"fitness_mean": float(best[-1]), "full_reward_mean": float(best[-1])}
+    scores = {"fitness_mean": float(best[-1]), "fitness_std": 0.1, "full_reward_mean": float(best[-1]), "episodes": 20}
     result = {"training": float(best[-1]), "validation": float(seed), "champion": scores}
     spent = {"episodes": 1000 * generations, "env_steps": int(steps[-1]), "wall_seconds": 1.0}
     write_json(run.manifest, {"status": DONE, "result": result, "budget_spent": spent})
@@ -88,7 +88,7 @@ def finish(run: RunDirectory, arm: str, seed: int, height: float, generations: i
 def finish_baseline(run: RunDirectory, arm: str, scale: float) -> None:
     """A run that nothing trained."""
     run.path.mkdir(parents=True, exist_ok=True)
-    champion = {"fitness_mean": 0.2 * scale, "full_reward_mean": 0.2 * scale}
+    champion = {"fitness_mean": 0.2 * scale, "fitness_std": 0.1, "full_reward_mean": 0.2 * scale, "episodes": 20}
     write_json(run.manifest, {"status": DONE, "arm": arm, "result": {"champion": champion}})
 
 
