@@ -58,7 +58,7 @@ CASES = {
     "task=../task/ant": ["task: expected the name of an option", "--config-dir"],
     "task=/etc/passwd": ["task: expected the name of an option, got '/etc/passwd'"],
     "linkage=lines": ["linkage=lines: no such option; known: feedback"],
-    "executor=mpi": ["executor=mpi: no such option; known: serial, threads"],
+    "executor=mpi": ["executor=mpi: no such option; known: dask, serial, threads"],
     "sweep=3": ["sweep: expected the name of an option, got 3"],
     "sweep=[gap,wind]": ["sweep=wind: no such option"],
     "generations=1e999": ["generations: expected", "inf"],

@@ -146,7 +146,7 @@ def spoil_manifest(run: RunDirectory, **entries: object) -> None:
 @pytest.mark.parametrize(
     ("spoil", "named"),
     [
-        (lambda run: spoil_manifest(run, format=99), "expected a run of format 1, got 99"),
+        (lambda run: spoil_manifest(run, format=99), "expected a run of format 2, got 99"),
         (lambda run: spoil_manifest(run, status="running"), "expected a finished run, got status 'running'"),
         (lambda run: spoil_manifest(run, configuration_hash="0"), "does not describe the run beside it"),
         (lambda run: run.manifest.write_text("{"), "expected JSON"),
