@@ -12,7 +12,16 @@ from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep
 
 from exneat_cli.errors import ConfigError, ExneatError, shortened
 
-_SET_HERE = ("run", "sweep.subdir", "output_subdir", "job_logging", "hydra_logging", "searchpath", "job.chdir", "callbacks")
+_SET_HERE = (
+    "run",
+    "sweep.subdir",
+    "output_subdir",
+    "job_logging",
+    "hydra_logging",
+    "searchpath",
+    "job.chdir",
+    "callbacks",
+)
 """Keys below hydra. that would write, look or call outside of what exneat checks."""
 _MOST_JOBS = 10_000
 _OF_LISTS = ("sweep",)

@@ -17,8 +17,8 @@ def _cells(row: Row) -> tuple[object, ...]:
 
 
 def print_table(rows: Sequence[Row]) -> None:
-    """Print all rows in aligned columns, figures to two decimals."""
-    lines = [COLUMNS, *(tuple(f"{c:.2f}" if isinstance(c, float) else str(c) for c in _cells(row)) for row in rows)]
+    """Print all rows in aligned columns, figures to two decimals, small ones to four."""
+    lines = [COLUMNS, *(tuple(_shown(c) for c in _cells(row)) for row in rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(COLUMNS))]
     figures = {COLUMNS.index(name) for name in ("median", "min", "max", "repetitions")}
     for line in lines:
@@ -30,3 +30,9 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
     """Write all rows, every digit kept; the folder is made if absent."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_csv(path, COLUMNS, [_cells(row) for row in rows])
+
+
+def _shown(cell: object) -> str:
+    if not isinstance(cell, float):
+        return str(cell)
+    return f"{cell:.2f}" if abs(cell) >= 1.0 else f"{cell:.4f}"
