@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ import yaml
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import finishing
+
+_TEMPORARY = re.compile(r"\..+\.(\d{1,10})\.tmp")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -41,6 +44,24 @@ def delete(path: Path) -> None:
     """Delete a file that may be there; one that cannot be deleted stays."""
     with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
+
+
+def delete_orphans(directory: Path) -> None:
+    """Delete temporary files of processes that were killed while they wrote there."""
+    for path in directory.glob(".*.tmp"):
+        maker = _TEMPORARY.fullmatch(path.name)
+        if maker and not _is_alive(int(maker[1])):
+            delete(path)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return process != os.getpid()
 
 
 def make_directory(path: Path) -> None:

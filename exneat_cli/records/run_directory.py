@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, read_json, read_yaml, write_json, write_whole
+from exneat_cli.records.files import delete, delete_orphans, read_json, read_yaml, write_json, write_whole
 from exneat_cli.records.locks import held
 
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
@@ -135,7 +135,10 @@ class RunDirectory:
         """
         self._make()
         with self.held():
-            yield self._claim(full_hash, configuration, resume)
+            claim = self._claim(full_hash, configuration, resume)
+            for directory in (self.path, self.plots):
+                delete_orphans(directory)
+            yield claim
 
     def _make(self) -> None:
         try:
