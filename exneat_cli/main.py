@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listen
+from exneat_cli.interruption import GOES_ON, listen
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"exneat: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        print("exneat: interrupted; the same command goes on (exneat train needs resume=true for it)", file=sys.stderr)
+        print(GOES_ON, file=sys.stderr)
         return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0
