@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import signal
 import sys
@@ -31,6 +32,9 @@ USAGE = {
     "  each line is ok, degraded (works, but slower or in part) or broken; exit code 1 if anything is broken",
 }
 """What --help prints for the commands that Hydra does not answer for."""
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -83,3 +87,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        where = error.filename or "temporary files or the program's own output"
+        print(f"exneat: {where}: {error.strerror}; check the disk, output= and TMPDIR", file=sys.stderr)
+        return 2
