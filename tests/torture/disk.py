@@ -52,8 +52,8 @@ def fill_disks(count: int, seed: int) -> list[Finding]:
     limits = sum(fault.file_size is not None for fault in faults)
     note = f"of {first.writes} in a run, alone or with all later ones; {failed} ended it, the others did no harm"
     return [
-        exactly("failing writes tried", len(faults) - limits, len(faults) - limits, note),
-        exactly("limits of file size tried", limits, limits),
+        exactly("failing writes tried", len(faults) - limits, min(count, 2 * first.writes), note),
+        exactly("limits of file size tried", limits, min(count, len(_FILE_SIZES))),
         Finding("full file systems tried", disks, "any", True, "" if disks else "skipped: none may be mounted here"),
         mistakes.none_of("faults that were not one clear line, lost a checkpoint or changed bytes"),
     ]
@@ -108,7 +108,7 @@ def _fill_real_disks(folder: Path, count: int, expected: dict[str, bytes], mista
     """The same on small file systems in memory, each seen by nobody else; returns how many there were."""
     if subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "none", str(folder)], capture_output=True).returncode:
         return 0
-    sizes = [_DISK_SIZES[round(k)] for k in _spread(len(_DISK_SIZES), count)]
+    sizes = [_DISK_SIZES[round(k)] for k in _spread(len(_DISK_SIZES), max(1, count // 10))]
     for size in sizes:
         _fill_real_disk(size, folder / f"disk{size}", expected, mistakes)
     return len(sizes)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from exneat_cli.records import make_directory, write_csv
 
-_SHOWN = 100
+_SHOWN = 8
 """Mistakes of one case that are told in full."""
 
 

@@ -66,7 +66,7 @@ def interrupt(count: int, seed: int) -> list[Finding]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "small.yaml").write_text(yaml.safe_dump(_EXPERIMENT))
-        commands = _commands(folder / "small.yaml")
+        commands = _commands(folder / "small.yaml")[:count]
         lasting, expected = [], []
         for number, command in enumerate(commands):
             began = time.monotonic()
