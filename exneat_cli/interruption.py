@@ -5,12 +5,17 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 PATIENCE = 4.0
 """Seconds after which a process that was asked to end is ended."""
+_PAUSE = 0.05
+"""Seconds until a signal is sent again; it must not come up in the same callback."""
+GOES_ON = "exneat: interrupted; the same command goes on (a single exneat train with resume=true)"
+"""The last line of whoever was interrupted."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -43,6 +48,7 @@ def listen() -> None:
     if _Heard.watch is not None:
         _Heard.watch.cancel()
     _Heard.first = _Heard.waiting = _Heard.watch = None
+    sys.unraisablehook = _hear_again
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _hear)
 
@@ -71,13 +77,30 @@ def _hear(number: int, frame: object) -> None:
     if _Heard.first is not None:
         _end(number)
     _Heard.first = number
-    _Heard.watch = threading.Timer(PATIENCE, _end, (number,))
+    _Heard.watch = threading.Timer(PATIENCE, _give_up, (number,))
     _Heard.watch.daemon = True
     _Heard.watch.start()
     if _Heard.writes_in_hand:
         _Heard.waiting = number
     else:
         raise Interrupted(number)
+
+
+def _hear_again(lost: sys.UnraisableHookArgs) -> None:
+    """Send a signal again whose exception came up where Python drops it, as in a callback of a weak reference."""
+    if not isinstance(lost.exc_value, Interrupted):
+        sys.__unraisablehook__(lost)
+        return
+    _Heard.first = None
+    again = threading.Timer(_PAUSE, os.kill, (os.getpid(), lost.exc_value.number))
+    again.daemon = True
+    again.start()
+
+
+def _give_up(number: int) -> None:
+    with contextlib.suppress(OSError):
+        os.write(2, f"{GOES_ON}\n".encode())
+    _end(number)
 
 
 def _end(number: int) -> None:

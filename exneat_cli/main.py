@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import signal
 import sys
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listen
+from exneat_cli.interruption import GOES_ON, listen
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -31,6 +32,9 @@ USAGE = {
     "  each line is ok, degraded (works, but slower or in part) or broken; exit code 1 if anything is broken",
 }
 """What --help prints for the commands that Hydra does not answer for."""
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -84,7 +88,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"exneat: {_printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        print("exneat: interrupted; the same command goes on (a single exneat train with resume=true)", file=sys.stderr)
+        print(GOES_ON, file=sys.stderr)
         return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        where = error.filename or "temporary files or the program's own output"
+        print(f"exneat: {where}: {error.strerror}; check the disk, output= and TMPDIR", file=sys.stderr)
+        return 2

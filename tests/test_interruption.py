@@ -84,3 +84,46 @@ def test_a_process_that_swallows_the_signal_is_ended_with_its_children(tmp_path:
     """)
     assert done.returncode == 143
     assert not Path(f"/proc/{note.read_text()}").exists() or "Z" in Path(f"/proc/{note.read_text()}/stat").read_text()
+
+
+DROPPED = """
+import os, signal, time, weakref
+from exneat_cli import interruption
+
+class Thing:
+    pass
+
+interruption.listen()
+thing = Thing()
+watched = weakref.ref(thing, lambda _: [os.kill(os.getpid(), signal.SIGTERM), time.sleep(0.01)])
+try:
+    del thing
+    time.sleep(60)
+except interruption.Interrupted as interrupted:
+    print("heard", interrupted.number == signal.SIGTERM)
+"""
+
+SWALLOWED = """
+import os, signal, time
+from exneat_cli import interruption
+
+interruption.PATIENCE = 0.2
+interruption.listen()
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+except BaseException:
+    pass
+time.sleep(60)
+"""
+
+
+def test_a_signal_in_the_callback_of_a_weak_reference_is_heard_after_it() -> None:
+    done = in_process(DROPPED)
+    assert (done.stdout, done.stderr) == ("heard True\n", "")
+
+
+def test_a_process_that_swallows_the_exception_is_ended_with_the_line_that_says_how_to_go_on() -> None:
+    done = in_process(SWALLOWED)
+    assert done.returncode == 130
+    assert done.stderr.startswith("exneat: interrupted; the same command goes on")

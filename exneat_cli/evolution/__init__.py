@@ -8,6 +8,7 @@ from exneat_cli.evolution.genome_data import genome_from_data, genome_to_data
 from exneat_cli.evolution.hall_of_fame import Entry, HallOfFame
 from exneat_cli.evolution.packing import Columns, pack, unpack
 from exneat_cli.evolution.settings import RECURRENT, EvolutionSettings, neat_config
+from exneat_cli.evolution.soundness import check_genome
 
 __all__ = [
     "ACTIVATIONS",
@@ -21,6 +22,7 @@ __all__ = [
     "HallOfFame",
     "Snapshot",
     "Team",
+    "check_genome",
     "from_stock",
     "genome_from_data",
     "genome_to_data",

@@ -10,7 +10,7 @@ from typing import Any
 
 import neat
 
-from exneat_cli.errors import check_choice, check_flag, check_real, check_whole
+from exneat_cli.errors import ExneatError, check_choice, check_flag, check_real, check_whole
 from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.genes import ACTIVATIONS
 from exneat_cli.evolution.initial_connections import INITIAL_CONNECTIONS
@@ -145,6 +145,9 @@ def neat_config(
         population: genomes per generation.
         shape: numbers of inputs, initial hidden nodes and outputs.
         genome_type: the genome's class, if not what the settings say.
+
+    Raises:
+        ExneatError: neat-python reads its configuration from a file only, and none could be written.
     """
     genome_type = genome_type or GENOMES[settings.genome]
     inputs, hidden, outputs = shape
@@ -224,8 +227,13 @@ def _change(name: str, rate: float, replace: float, power: float) -> dict[str, o
 def _read_config(sections: dict[str, dict[str, object]], genome_type: type[Any]) -> neat.Config:
     parser = ConfigParser()
     parser.read_dict(sections)
-    with tempfile.TemporaryDirectory() as directory:
-        path = Path(directory) / "neat.ini"
-        with path.open("w", encoding="utf-8") as file:
-            parser.write(file)
-        return neat.Config(genome_type, SteadyReproduction, neat.DefaultSpeciesSet, neat.DefaultStagnation, str(path))
+    try:
+        with tempfile.TemporaryDirectory() as directory:
+            path = Path(directory) / "neat.ini"
+            with path.open("w", encoding="utf-8") as file:
+                parser.write(file)
+            kinds = (SteadyReproduction, neat.DefaultSpeciesSet, neat.DefaultStagnation)
+            return neat.Config(genome_type, *kinds, str(path))
+    except OSError as error:
+        why = f"a temporary file of neat-python's configuration could not be written: {error.strerror}"
+        raise ExneatError(f"{why}\n  check the disk, or set TMPDIR to a directory with room") from error

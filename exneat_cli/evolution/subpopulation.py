@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +17,7 @@ from numpy.random import SeedSequence
 from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.conversion import from_stock
 from exneat_cli.evolution.counter import Counter
+from exneat_cli.evolution.soundness import check_genome
 
 _GLOBAL_RANDOM_STATE = threading.Lock()
 """Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
@@ -139,13 +141,37 @@ class Subpopulation:
         subpopulation._reproduction.genome_indexer = Counter(int(state["next_genome"]))
         subpopulation._species.indexer = Counter(int(state["next_species"]))
         subpopulation._restore_species(state["species"])
+        subpopulation._check(state)
         return subpopulation
+
+    def _check(self, state: Mapping[str, Any]) -> None:
+        """Refuse genomes that make no network here, and ids that are about to be given a second time."""
+        genome_config = self.config.genome_config
+        arrays = [self.in_arrays(key) for key in self.genomes]
+        for genome in arrays:
+            check_genome(
+                genome,
+                genome_config.num_inputs,
+                genome_config.num_outputs,
+                feed_forward=genome_config.feed_forward,
+            )
+        highest = {
+            "next_genome": max(self.genomes),
+            "next_species": max(self._species.species),
+            "next_node": max(int(genome.nodes["key"].max()) for genome in arrays),
+            "last_innovation": max(int(genome.connections["innovation"].max(initial=0)) for genome in arrays) - 1,
+        }
+        for name, key in highest.items():
+            if state[name] <= key:
+                raise ValueError(f"{name}: expected more than {key}, got {state[name]}")
 
     def _restore_species(self, entries: Sequence[Mapping[str, Any]]) -> None:
         for entry in entries:
             species = Species(int(entry["id"]), int(entry["created"]))
             species.last_improved = int(entry["last_improved"])
             species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
+            if not all(map(math.isfinite, species.fitness_history)) or species.key in self._species.species:
+                raise ValueError(f"species {species.key}: comes twice, or its fitness is not finite")
             members = {int(key): self.genomes[int(key)] for key in entry["members"]}
             species.update(self.genomes[int(entry["representative"])], members)
             self._species.species[species.key] = species

@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import finishing
 
 _LARGEST_FILE = 64 * 1024**2
+_TEMPORARY = re.compile(r"\..+\.(\d{1,10})\.tmp")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -43,6 +45,24 @@ def delete(path: Path) -> None:
     """Delete a file that may be there; one that cannot be deleted stays."""
     with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
+
+
+def delete_orphans(directory: Path) -> None:
+    """Delete temporary files of processes that were killed while they wrote there."""
+    for path in directory.glob(".*.tmp"):
+        maker = _TEMPORARY.fullmatch(path.name)
+        if maker and not _is_alive(int(maker[1])):
+            delete(path)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return process != os.getpid()
 
 
 def make_directory(path: Path) -> None:

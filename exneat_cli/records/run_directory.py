@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, write_json, write_whole
+from exneat_cli.records.files import delete, delete_orphans, write_json, write_whole
 from exneat_cli.records.locks import held
 from exneat_cli.records.manifest_data import read_manifest_data, result_of
 from exneat_cli.records.yaml_files import read_yaml
@@ -137,7 +137,10 @@ class RunDirectory:
         """
         self._make()
         with self.held():
-            yield self._claim(full_hash, configuration, resume)
+            claim = self._claim(full_hash, configuration, resume)
+            for directory in (self.path, self.plots):
+                delete_orphans(directory)
+            yield claim
 
     def _make(self) -> None:
         try:

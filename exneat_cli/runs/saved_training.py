@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -66,14 +67,12 @@ class SavedTraining:
         remembered = [
             {genome.key: genome for genome in unpack(_of(checkpoint.arrays, index, _REMEMBERED))} for index in numbers
         ]
+        history = [_row(number, values) for number, values in enumerate(plain["history"], start=1)]
         return cls(
             Snapshot(plain["coevolution"], [_of(checkpoint.arrays, index, _CURRENT) for index in numbers]),
-            [
-                Entry(_team(ids, remembered), float(fitness), int(generation))
-                for ids, fitness, generation in plain["hall_of_fame"]
-            ],
+            [_entry(values, remembered, len(history)) for values in plain["hall_of_fame"]],
             _team(plain["first_generation"], remembered),
-            [_row(number, values) for number, values in enumerate(plain["history"], start=1)],
+            history,
         )
 
 
@@ -91,8 +90,16 @@ def _team(ids: Sequence[Any], genomes: Sequence[Mapping[int, ArrayGenome]]) -> T
     return Team(tuple(own[key] for own, key in zip(genomes, keys, strict=True)), keys)
 
 
+def _entry(values: Sequence[Any], genomes: Sequence[Mapping[int, ArrayGenome]], generations: int) -> Entry:
+    ids, fitness, generation = values
+    entry = Entry(_team(ids, genomes), float(fitness), int(generation))
+    if not math.isfinite(entry.fitness) or not 0 <= entry.generation < generations:
+        raise ValueError(f"expected a finite fitness in one of {generations} generations, got {values}")
+    return entry
+
+
 def _row(number: int, values: Sequence[Any]) -> HistoryRow:
     row = HistoryRow(*values)
-    if row.generation != number or not all(isinstance(value, int | float) for value in row):
+    if row.generation != number or not all(isinstance(each, int | float) and math.isfinite(each) for each in row):
         raise ValueError(f"expected the figures of generation {number}, got {values}")
     return row

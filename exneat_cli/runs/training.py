@@ -12,7 +12,7 @@ import numpy as np
 
 from exneat_cli.brains import assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, neat_config
+from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, check_genome, neat_config
 from exneat_cli.records import Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.saved_training import SavedTraining
@@ -127,6 +127,9 @@ class _Training:
         saved = SavedTraining.read(checkpoint, len(configs))
         if not 1 <= len(saved.history) == checkpoint.generation <= settings.generations:
             raise ValueError(f"expected at most {settings.generations} generations, got {len(saved.history)}")
+        for team in (saved.first_generation, *(entry.team for entry in saved.hall_of_fame)):
+            for genome, (inputs, _, outputs) in zip(team.genomes, settings.plan.subpopulation_shapes, strict=True):
+                check_genome(genome, inputs, outputs, feed_forward=settings.evolution.feed_forward)
         training = cls.__new__(cls)
         training._settings, training._runner, training._plan = settings, runner, settings.plan
         training._coevolution = Coevolution.restored(configs, saved.coevolution, settings.pairing)

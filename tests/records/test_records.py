@@ -7,6 +7,8 @@ import itertools
 import json
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -160,6 +162,21 @@ def test_what_a_run_left_that_was_killed_before_its_manifest_is_taken_up(tmp_pat
     assert claim(begun, "hash", resume=resume) is Claim.BEGIN
     (begun.path / ".manifest.json.7.tmp").write_text("half")
     assert claim(begun, "hash", resume=resume) is Claim.BEGIN
+
+
+def test_what_was_being_written_at_a_kill_is_gone_after_the_next_claim_and_what_others_write_is_not(
+    tmp_path: Path,
+) -> None:
+    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    run = started(tmp_path / "run", "running")
+    run.plots.mkdir()
+    orphans = [folder / f".x.csv.{int(dead.stdout)}.tmp" for folder in (run.path, run.plots)]
+    others = [run.plots / f".x.svg.{os.getppid()}.tmp", run.path / ".of-somebody-else.tmp"]
+    for path in (*orphans, *others):
+        path.write_text("half")
+    claim(run, "hash", resume=True)
+    assert not any(path.exists() for path in orphans)
+    assert all(path.exists() for path in others)
 
 
 def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) -> None:

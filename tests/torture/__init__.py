@@ -1,1 +1,1 @@
-"""What a run survives: too long for every test run, each a function that returns figures."""
+"""Faults of every kind, put upon real runs: see `python -m tests.torture --help`."""
