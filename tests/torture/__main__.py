@@ -22,6 +22,7 @@ CASES = {
     "workers": ("workers", "compare_workers", 2),
     "disk": ("disk", "fill_disks", 1000),
     "checkpoints": ("checkpoints", "damage_checkpoints", 1000),
+    "dask": ("dask_workers", "lose_workers", 10),
     "races": ("races", "race", 100),
     "signals": ("interruptions", "interrupt", 50),
     "sweeps": ("sweeps", "kill_sweeps", 20),

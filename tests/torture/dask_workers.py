@@ -18,6 +18,7 @@ from exneat_cli.rollouts import Executor
 from exneat_cli.runs import RunSettings, Silence, train
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry
+from tests.torture.findings import Finding, exactly
 
 RESULTS = ("champion.json", "hall_of_fame.jsonl", "trace.csv")
 """The files of a run that must not differ in a single byte; history.csv may in its last column, wall_seconds."""
@@ -114,3 +115,13 @@ def _results(settings: RunSettings, progress: Silence | None = None) -> list[byt
     run = train(settings, progress=progress).directory
     history = [line.rpartition(b",")[0] for line in run.history.read_bytes().splitlines()]
     return [*((run.path / name).read_bytes() for name in RESULTS), *history]
+
+
+def lose_workers(count: int, seed: int) -> list[Finding]:
+    """Kill so many workers while one run lasts; returns the figures."""
+    killed = kill_workers(count, seed)
+    note = f"{killed.seconds:.0f} s, undisturbed on one thread {killed.seconds_undisturbed:.0f} s"
+    return [
+        exactly("dask workers killed while evaluating", killed.kills, count, note),
+        exactly("runs that ended with other bytes", 1 - killed.same_bytes, 0),
+    ]

@@ -7,7 +7,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train
 from exneat_cli.tasks import TASKS, AntTask
@@ -68,10 +67,7 @@ def _settings(task: str, algorithm: str, seed: int) -> RunSettings:
 
 
 def _executors() -> list[Executor]:
-    found = [Executor("serial"), *(Executor("threads", workers) for workers in _WORKERS)]
-    if (configuration_directory() / "executor" / "dask.yaml").exists():
-        found.append(Executor("dask", 2))
-    return found
+    return [Executor("serial"), *(Executor(name, workers) for name in ("threads", "dask") for workers in _WORKERS)]
 
 
 def _named(executor: Executor) -> str:
