@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ant test check tests format reproduce report bench torture wheel clean
+.PHONY: help ant test check tests format reproduce report bench equivalence torture wheel clean
 
 # Reports take the largest budget that has runs unless BUDGET is given.
 OF_BUDGET := $(if $(BUDGET),budget=$(BUDGET))
@@ -57,6 +57,9 @@ table-%: $(VENV)/installed ## one table, e.g. make table-5.5
 
 bench: $(VENV)/installed ## how fast it is, as ratios, in five parts (several minutes on an idle machine)
 	$(BIN)/python -m tests.bench
+
+equivalence: $(VENV)/installed ## whether array genomes evolve as well as neat-python's own (some twenty minutes)
+	$(BIN)/python -m tests.equivalence
 
 torture: $(VENV)/installed ## kills, full disks, damage, races and signals, against their bars (about an hour on an idle machine)
 	$(BIN)/python -m tests.torture
