@@ -29,12 +29,14 @@ class PlannedRun:
     Attributes:
         condition, arm, seed: its place in the experiment.
         directory: where its files are, or will be.
+        generations: how long it is trained; None takes any length.
     """
 
     condition: str
     arm: str
     seed: int
     directory: RunDirectory
+    generations: int | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Study:
     @functools.cached_property
     def finished(self) -> tuple[PlannedRun, ...]:
         """The runs that are done."""
-        return tuple(run for run in self.runs if _status(run.directory) == DONE)
+        return tuple(run for run in self.runs if _is_finished(run))
 
     def of(self, condition: str, arm: str) -> tuple[PlannedRun, ...]:
         """Finished runs of one arm in one condition, in the order of their seeds."""
@@ -132,8 +134,11 @@ class Study:
         return pd.DataFrame(rows, columns=["seed", "training", "validation", "test", "full_reward"])
 
 
-def _status(directory: RunDirectory) -> object:
-    return directory.read_manifest().get("status") if directory.is_there() else None
+def _is_finished(run: PlannedRun) -> bool:
+    if not run.directory.is_there():
+        return False
+    manifest = run.directory.read_manifest()
+    return manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
 
 
 def _result(result: Mapping[str, Any]) -> dict[str, float]:

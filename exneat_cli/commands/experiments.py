@@ -246,7 +246,6 @@ def _jobs(
             f"budget={budget}",
             f"sweep={sweeps}",
             f"name={experiment.name}-{condition}-{budget}",
-            "resume=true",
             *overrides,
         ]
     )

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 OPTIONAL = {
     "joblib": ("hydra-joblib-launcher==1.2.0", "runs side by side on one machine"),
-    "submitit": ("hydra-submitit-launcher==1.2.0", "runs as jobs of a Slurm cluster"),
-    "dask": ("distributed", "episodes on a Dask cluster"),
+    "slurm": ("hydra-submitit-launcher==1.2.0", "runs as jobs of a Slurm cluster"),
+    "dask": ("dask[distributed]", "episodes on a Dask cluster"),
 }
 """Extras by name: what to install where exneat's metadata does not say, and what for."""
 

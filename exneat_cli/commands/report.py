@@ -17,6 +17,7 @@ from exneat_cli.analysis.tables import build_table
 from exneat_cli.commands.composition import BUDGETS
 from exneat_cli.commands.experiments import (
     Experiment,
+    Job,
     experiment_names,
     experiments_directory,
     plan_jobs,
@@ -131,6 +132,11 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
     return [part.experiment for part in parts]  # type: ignore[attr-defined]
 
 
+def _planned(job: Job) -> PlannedRun:
+    settings = job.settings
+    return PlannedRun(job.condition, job.arm, settings.seed, settings.directory, settings.trained_generations)
+
+
 def _study(experiment: Experiment, request: Request) -> Study:
     budget = request.budget or _largest_budget(experiment, request.output)
     jobs = plan_jobs(experiment, budget, [f"output={request.output}", *request.overrides])
@@ -154,7 +160,7 @@ def _study(experiment: Experiment, request: Request) -> Study:
         baselines=tuple(dict.fromkeys(job.arm for job in jobs if job.settings.algorithm in UNTRAINED)),
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps=labels,
-        runs=tuple(PlannedRun(job.condition, job.arm, job.settings.seed, job.settings.directory) for job in jobs),
+        runs=tuple(_planned(job) for job in jobs),
         levels=levels,
         sweep_episodes=next((job.sweeps.episodes for job in jobs if job.sweeps.sweeps), None),
     )

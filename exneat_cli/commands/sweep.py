@@ -123,7 +123,7 @@ class Launch:
     def _do(self, job: Job, *, show_bar: bool) -> str:
         settings, asked = job.settings, job.sweeps
         progress = progress_for_terminal() if show_bar else Silence()
-        finished = train(settings, progress=progress, command=self.command)
+        finished = train(settings, progress=progress, command=self.command, go_on=True)
         directory = finished.directory
         run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)
         draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from collections.abc import Sequence
 
@@ -42,11 +41,11 @@ def run(arguments: Sequence[str]) -> int:
 
 def _train(config: DictConfig, arguments: Sequence[str]) -> None:
     settings = settings_from(config)
-    if HydraConfig.get().mode is RunMode.MULTIRUN:
-        settings = dataclasses.replace(settings, resume=True)
     asked = sweeps_from(config, settings.task.name)
     check_sweeps(settings, asked.sweeps, asked.episodes)
-    finished = train(settings, progress=progress_for_terminal(), command=["exneat", "train", *arguments])
+    again = HydraConfig.get().mode is RunMode.MULTIRUN
+    command = ["exneat", "train", *arguments]
+    finished = train(settings, progress=progress_for_terminal(), command=command, go_on=again)
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")

@@ -19,6 +19,7 @@ from exneat_cli.evolution.conversion import from_stock
 from exneat_cli.evolution.counter import Counter
 from exneat_cli.evolution.soundness import check_genome
 
+_LARGEST_ID = 2**62
 _GLOBAL_RANDOM_STATE = threading.Lock()
 """Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
 
@@ -162,8 +163,10 @@ class Subpopulation:
             "last_innovation": max(int(genome.connections["innovation"].max(initial=0)) for genome in arrays) - 1,
         }
         for name, key in highest.items():
-            if state[name] <= key:
+            if not key < state[name] < _LARGEST_ID:
                 raise ValueError(f"{name}: expected more than {key}, got {state[name]}")
+        if not 0 <= self._generation < _LARGEST_ID:
+            raise ValueError(f"generation: expected at least 0, got {self._generation}")
 
     def _restore_species(self, entries: Sequence[Mapping[str, Any]]) -> None:
         for entry in entries:
@@ -172,6 +175,8 @@ class Subpopulation:
             species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
             if not all(map(math.isfinite, species.fitness_history)) or species.key in self._species.species:
                 raise ValueError(f"species {species.key}: comes twice, or its fitness is not finite")
+            if not entry["members"]:
+                raise ValueError(f"species {species.key}: expected members")
             members = {int(key): self.genomes[int(key)] for key in entry["members"]}
             species.update(self.genomes[int(entry["representative"])], members)
             self._species.species[species.key] = species

@@ -1,4 +1,4 @@
-"""Everything on disk: layout, columns, champions, manifests."""
+"""Everything on disk: layout, columns, champions, checkpoints, manifests, locks."""
 
 from exneat_cli.records import disk, provenance
 from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, write_whole
+from exneat_cli.records.files import delete, read_bytes, write_whole
 
 FORMAT = 1
 KEPT = 2
 """The newest one, and one to fall back to."""
+_LARGEST = 16 * 1024**3
 _NAME = re.compile(r"checkpoint-(\d{6,9})\.npz")
 _STATE, _DIGEST = "state", "digest"
 
@@ -60,8 +61,13 @@ def write_checkpoint(directory: Path, checkpoint: Checkpoint, configuration_hash
     buffer = io.BytesIO()
     np.savez(buffer, **members, **{_DIGEST: np.frombuffer(_digest(members), np.uint8)})  # type: ignore[arg-type]
     write_whole(directory / f"checkpoint-{checkpoint.generation:06d}.npz", buffer.getvalue())
-    for path, _ in _found(directory)[KEPT:]:
-        delete(path)
+    kept = 0
+    for path, generation in _found(directory):
+        # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
+        if generation > checkpoint.generation or kept == KEPT:
+            delete(path)
+        else:
+            kept += 1
 
 
 def read_checkpoints(directory: Path, configuration_hash: str) -> Iterator[Checkpoint | str]:
@@ -86,7 +92,7 @@ def _found(directory: Path) -> list[tuple[Path, int]]:
 
 def _read(path: Path, generation: int, configuration_hash: str) -> Checkpoint:
     try:
-        members = _members(path.read_bytes())
+        members = _members(read_bytes(path, _LARGEST))
         if members.pop(_DIGEST).tobytes() != _digest(members):
             raise ValueError("its digest is not that of its content")
         plain = json.loads(members.pop(_STATE).tobytes())

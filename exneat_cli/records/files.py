@@ -17,7 +17,7 @@ from typing import Any
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import finishing
 
-_LARGEST_FILE = 64 * 1024**2
+_LARGEST_TEXT = 64 * 1024**2
 _TEMPORARY = re.compile(r"\..+\.(\d{1,10})\.tmp")
 
 
@@ -104,25 +104,34 @@ def read_text(path: Path) -> str:
     """The text of a file, without a byte order mark, lines ended by line feeds.
 
     Raises:
-        ExneatError: it is missing, unreadable, no file (a directory, or a pipe that would never end), larger than
-            64 MiB, or not UTF-8.
+        ExneatError: see `read_bytes`; or it is larger than 64 MiB, or not UTF-8.
     """
-    try:
-        kind = path.stat()
-        if not stat.S_ISREG(kind.st_mode):
-            raise ExneatError(f"{path}: could not be read: expected a file, got {_kind_of(kind.st_mode)}")
-        if kind.st_size > _LARGEST_FILE:
-            raise ExneatError(f"{path}: expected at most {_LARGEST_FILE} bytes, got {kind.st_size}")
-        data = path.read_bytes()
-    except OSError as error:
-        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
-    except ValueError as error:
-        raise ExneatError(f"{str(path)!r}: could not be read: {error}") from error
+    data = read_bytes(path, _LARGEST_TEXT)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise ExneatError(f"{path}:{line}: expected UTF-8 text, got the byte {data[error.start]:#04x}") from error
+
+
+def read_bytes(path: Path, largest: int) -> bytes:
+    """The content of a file.
+
+    Raises:
+        ExneatError: it is missing, unreadable, no file (a directory, or a pipe that would never end), or larger than
+            `largest` bytes.
+    """
+    try:
+        kind = path.stat()
+        if not stat.S_ISREG(kind.st_mode):
+            raise ExneatError(f"{path}: could not be read: expected a file, got {_kind_of(kind.st_mode)}")
+        if kind.st_size > largest:
+            raise ExneatError(f"{path}: expected at most {largest} bytes, got {kind.st_size}")
+        return path.read_bytes()
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ExneatError(f"{str(path)!r}: could not be read: {error}") from error
 
 
 def _kind_of(mode: int) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from exneat_cli.errors import ExneatError
 
+_TRIES, _PAUSE = 3, 0.02
+"""How often a lock is asked for, and the seconds in between."""
 _KERNEL_LOCKS = Path("/proc/locks")
 
 
@@ -28,7 +31,7 @@ def held(directory: Path) -> Iterator[None]:
         raise ExneatError(f"{directory}: cannot be opened: {error.strerror}") from error
     try:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(descriptor)
         except BlockingIOError:
             process = _holder(descriptor) or "unknown"
             raise ExneatError(f"{directory}: another process is writing there (process id {process})") from None
@@ -42,13 +45,29 @@ def held(directory: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+def _lock(descriptor: int) -> None:
+    """Take the lock; whoever only asks by `is_held` has it for less than a moment, so a second try is worth it."""
+    for _ in range(_TRIES - 1):
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        time.sleep(_PAUSE)
+    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
 def is_held(directory: Path) -> bool:
     """Whether a process holds the directory now."""
     try:
-        with held(directory):
-            return False
-    except ExneatError:
-        return True
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        return isinstance(error, BlockingIOError)
+    finally:
+        os.close(descriptor)
+    return False
 
 
 def _is_still(directory: Path, descriptor: int) -> bool:

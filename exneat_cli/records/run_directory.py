@@ -121,13 +121,16 @@ class RunDirectory:
         return self.path / "plots"
 
     @contextlib.contextmanager
-    def claimed(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool) -> Iterator[Claim]:
+    def claimed(
+        self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool
+    ) -> Iterator[Claim]:
         """Hold the directory, made if need be, against other processes.
 
         Args:
             full_hash: of the run, see `configuration_hash`.
             configuration: all its settings, as plain data.
-            resume: whether to go on with an unfinished run, or to make a finished one longer.
+            resume: whether to go on with an unfinished run.
+            lengthen: whether to make a finished one longer.
 
         Yields:
             What is to be done there.
@@ -137,7 +140,7 @@ class RunDirectory:
         """
         self._make()
         with self.held():
-            claim = self._claim(full_hash, configuration, resume)
+            claim = self._claim(full_hash, configuration, resume=resume, lengthen=lengthen)
             for directory in (self.path, self.plots):
                 delete_orphans(directory)
             yield claim
@@ -161,7 +164,7 @@ class RunDirectory:
         """
         return held(self.path)
 
-    def _claim(self, full_hash: str, configuration: Mapping[str, Any], resume: bool) -> Claim:
+    def _claim(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> Claim:
         if not self.manifest.exists():
             if self._holds_nothing():
                 return Claim.BEGIN
@@ -184,7 +187,7 @@ class RunDirectory:
                 f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
                 "  generations= can only be raised; set name= to another folder for a shorter run"
             )
-        if not resume:
+        if not (lengthen if status == DONE else resume):
             holds = f"a finished run of {there} generations" if status == DONE else f"an unfinished run ({status})"
             raise ExneatError(f"{self.path}: holds {holds}\n  add resume=true to go on from where it stopped")
         return Claim.CONTINUE

@@ -152,7 +152,7 @@ class _UnderWay:
                 raise ExneatError(f"executor=dask: a worker cannot import what it needs: {error}\n  {mend}") from error
             if not isinstance(error, KilledWorker):
                 raise error
-            if sent_before == RESUBMISSIONS:
+            if sent_before >= RESUBMISSIONS:
                 what = f"brains {parcel.first_brain} to {parcel.last_brain - 1} of a generation"
                 raise ExneatError(f"executor=dask: gave up {what}: one worker after the other died over them")
         elif not self._cluster.usable:

@@ -65,8 +65,10 @@ def play_parcel(expected: dict[str, str], parcel: bytes) -> Played:
             raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {mend}")
     setup, crew, episodes = pickle.loads(parcel)
     players = _players_of(setup)
-    player = players.pop() if players else None
-    fresh, player = player is None, player or Player(setup)
+    try:
+        player, fresh = players.pop(), False
+    except IndexError:  # no test before: another thread may take the last one in between
+        player, fresh = Player(setup), True
     began = time.perf_counter()
     results = Results.empty(len(crew.brains.size), len(episodes), len(setup.task.terms))
     buffers = player.buffers(crew)

@@ -42,7 +42,7 @@ class Player:
 
     Args:
         setup: what is simulated.
-        halt: (1,), set by another thread to stop before the next brain; left out, nothing stops it.
+        halt: (1,), set by another thread to stop; left out, nothing stops it.
     """
 
     def __init__(self, setup: Setup, halt: NDArray[np.bool_] | None = None) -> None:

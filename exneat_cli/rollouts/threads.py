@@ -49,6 +49,6 @@ class Threads:
             worker.result()
 
     def close(self) -> None:
-        """End all threads, before the next brain that one of them would run."""
+        """End all threads, before the next step of their episodes."""
         self._halt[0] = True
         self._pool.shutdown(cancel_futures=True)

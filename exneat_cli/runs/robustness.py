@@ -45,7 +45,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
-    described = {"configuration_hash": settings.full_hash, "generations": settings.generations}
+    described = {"configuration_hash": settings.full_hash, "generations": settings.trained_generations}
     if any(manifest.get(key) != value for key, value in described.items()):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
@@ -61,7 +61,7 @@ def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -
         "format": MANIFEST_FORMAT,
         "status": DONE,
         "configuration_hash": settings.full_hash,
-        "generations": settings.generations,
+        "generations": settings.trained_generations,
     }
     if any(manifest.get(key) != value for key, value in wanted.items()):
         return False
@@ -114,10 +114,11 @@ def run_robustness(
         ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
     """
     executor.check_installed()
-    settings = load_settings(directory)
-    check_sweeps(settings, sweeps, episodes)
+    load_settings(directory)  # before a directory that does not exist is held
     done = 0
     with directory.held():
+        settings = load_settings(directory)
+        check_sweeps(settings, sweeps, episodes)
         acting = _acting(directory, settings)
         for sweep in sweeps:
             levels = missing_levels(directory, sweep, episodes)

@@ -63,20 +63,29 @@ class Finished:
 
 
 @keep_clusters()
-def train(settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = ()) -> Finished:
+def train(
+    settings: RunSettings,
+    *,
+    progress: Progress | None = None,
+    command: Sequence[str] = (),
+    go_on: bool = False,
+) -> Finished:
     """Do one run, or find it done.
 
     Args:
         settings: see there.
         progress: told what happens; nothing is shown without it.
         command: the command line that asked for it, for the manifest.
+        go_on: go on with an unfinished run also without `settings.resume`, which alone makes a finished one longer.
 
     Raises:
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
     directory = settings.directory
-    with directory.claimed(settings.full_hash, settings.to_plain(), resume=settings.resume) as claim:
+    asked = {**settings.to_plain(), "generations": settings.trained_generations}
+    resume, lengthen = settings.resume or go_on, settings.resume
+    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as claim:
         if claim is not Claim.FINISHED:
             _train_in(directory, settings, progress or Silence(), command)
         result = directory.read_result()
@@ -90,13 +99,13 @@ def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress
     if before:
         _tell_other_versions(before, progress)
         manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
-    if before.get("status") == DONE:
         directory.forget_what_was_derived()
     directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
     try:
         result = _do(settings, directory, progress)
     except KeyboardInterrupt:
-        directory.update_manifest(status=INTERRUPTED)
+        with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure
+            directory.update_manifest(status=INTERRUPTED)
         raise
     except BaseException as error:
         with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
@@ -124,7 +133,7 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
         "task": settings.task.name,
         "seed": settings.seed,
         "configuration_hash": settings.full_hash,
-        "generations": settings.generations,
+        "generations": settings.trained_generations,
         "command": list(command),
         "started": _now(),
         "seeds": {"root": settings.seed, "streams": STREAMS},

@@ -15,7 +15,7 @@ from exneat_cli.evolution import PAIRINGS, RECURRENT, EvolutionSettings
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, Task
-from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring, plan_wiring
+from exneat_cli.wiring import CENTRAL, UNTRAINED, Geometry, Plan, Wiring, plan_wiring
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _Part = TypeVar("_Part")
@@ -105,6 +105,11 @@ class RunSettings:
         geometry = self.geometry.name + "".join(str(entry) for entry in vector)
         decentral = self.task.trunk is not None and self.wiring.central is False
         return f"exneat-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
+
+    @property
+    def trained_generations(self) -> int:
+        """Generations of training; 0 for a baseline, which nothing trains."""
+        return 0 if self.algorithm in UNTRAINED else self.generations
 
     @property
     def directory(self) -> RunDirectory:

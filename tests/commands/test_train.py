@@ -105,6 +105,16 @@ def test_a_repeated_multirun_goes_on_with_what_is_unfinished_and_leaves_the_rest
     assert len(json.loads((second / "manifest.json").read_text())["resumed"]) == 1
 
 
+def test_a_multirun_never_makes_a_finished_run_longer_unasked(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("task=track_maze", "budget=smoke", "test_episodes=1", "validation_episodes=1", f"output={tmp_path}")
+    assert main(["train", "-m", *arguments, "generations=1,2"]) == 2
+    assert "holds a finished run of 1 generations" in capfd.readouterr().err
+    (run,) = (tmp_path / "track_maze").iterdir()
+    assert json.loads((run / "manifest.json").read_text())["generations"] == 1
+
+
 def test_inspect_calls_a_run_killed_whose_process_is_gone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert train(f"output={tmp_path}") == 0
     run = RunDirectory(the_run(tmp_path))

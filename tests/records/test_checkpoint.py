@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import pickle
 import zipfile
 from collections.abc import Callable
@@ -142,3 +143,19 @@ def test_a_checkpoint_of_another_run_or_under_another_number_is_refused(tmp_path
     path.unlink()
     written(tmp_path).rename(tmp_path / "checkpoint-000004.npz")
     assert "its generation is not 4" in str(read(tmp_path)[0])
+
+
+def test_a_damaged_checkpoint_of_a_later_generation_never_crowds_out_a_sound_one(tmp_path: Path) -> None:
+    for generation in (6, 7):
+        written(tmp_path, generation).write_bytes(b"damaged")
+    for generation in (1, 2, 3):
+        written(tmp_path, generation)
+        assert is_whole(read(tmp_path)[0], generation)
+    assert [found.generation for found in read(tmp_path) if isinstance(found, Checkpoint)] == [3, 2]
+
+
+def test_a_pipe_in_a_checkpoints_place_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "checkpoint-000003.npz")
+    (found,) = read(tmp_path)
+    assert isinstance(found, str)
+    assert "expected a file, got a pipe" in found

@@ -97,8 +97,11 @@ def test_the_hash_ignores_where_and_how_but_not_what() -> None:
 SETTINGS = {"generations": 5, "seed": 0, "task": {"name": "ant", "patience": 100}}
 
 
-def claim(run: RunDirectory, full_hash: str, *, resume: bool = False, **changes: Any) -> Claim:
-    with run.claimed(full_hash, {**SETTINGS, **changes}, resume=resume) as claim:
+def claim(
+    run: RunDirectory, full_hash: str, *, resume: bool = False, lengthen: bool | None = None, **changes: Any
+) -> Claim:
+    longer = resume if lengthen is None else lengthen
+    with run.claimed(full_hash, {**SETTINGS, **changes}, resume=resume, lengthen=longer) as claim:
         return claim
 
 
@@ -131,6 +134,9 @@ def test_a_run_may_be_made_longer_by_resume_and_never_shorter(tmp_path: Path, st
     with pytest.raises(ExneatError, match=r"resume=true"):
         claim(run, "hash", generations=6)
     assert claim(run, "hash", resume=True, generations=6) is Claim.CONTINUE
+    if status == "done":
+        with pytest.raises(ExneatError, match=r"holds a finished run of 5 generations\n.*resume=true"):
+            claim(run, "hash", resume=True, lengthen=False, generations=6)
     with pytest.raises(ExneatError, match="holds a run of 5 generations, and 4 are asked for"):
         claim(run, "hash", resume=True, generations=4)
 
@@ -183,7 +189,7 @@ def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) ->
     run = started(tmp_path / "run", "running")
     assert not is_held(run.path)
     refused = pytest.raises(ExneatError, match=rf"another process .* \(process id {os.getpid()}\)")
-    with run.claimed("hash", SETTINGS, resume=True), refused:
+    with run.claimed("hash", SETTINGS, resume=True, lengthen=True), refused:
         assert is_held(run.path)
         claim(run, "hash", resume=True)
     assert claim(run, "hash", resume=True) is Claim.CONTINUE
