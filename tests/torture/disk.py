@@ -39,6 +39,7 @@ def fill_disks(count: int, seed: int) -> list[Finding]:
     mistakes = Mistakes()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        run_exneat([*_RUN, f"output={folder / 'warm'}"], Fault(), folder / "temporary")  # what it compiles is written
         first = run_exneat([*_RUN, f"output={folder / 'out'}"], Fault(), folder / "temporary")
         if first.code != 0:
             raise RuntimeError(f"the undisturbed run failed: {first.said[-500:]}")
