@@ -84,12 +84,17 @@ def _compiled_into(directory: Path | None, function: Callable[..., Any], options
     before = config.CACHE_DIR  # type: ignore[attr-defined]
     config.CACHE_DIR = "" if directory is None else str(directory)  # type: ignore[attr-defined]
     try:
-        decorate: Callable[..., Callable[..., Any]] = numba.njit(
-            nogil=True, cache=directory is not None, error_model="numpy", **options
-        )
-        return decorate(function)
+        try:
+            return _decorated(function, options, cache=directory is not None)
+        except RuntimeError:  # numba tries to write there; a full disk must cost time only
+            return _decorated(function, options, cache=False)
     finally:
         config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+
+def _decorated(function: Callable[..., Any], options: dict[str, Any], *, cache: bool) -> Callable[..., Any]:
+    decorate: Callable[..., Callable[..., Any]] = numba.njit(nogil=True, cache=cache, error_model="numpy", **options)
+    return decorate(function)
 
 
 def with_functions(template: Callable[..., Any], name: str, **functions: Callable[..., Any]) -> types.FunctionType:

@@ -83,3 +83,13 @@ def test_an_unusable_cache_directory_means_no_cache(tmp_path: Path, monkeypatch:
         assert compiled(double)(4.0) == 8.0
     finally:
         cache_directory.cache_clear()
+
+
+def test_a_full_disk_under_the_cache_costs_only_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments: object, **options: object) -> object:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("tempfile.TemporaryFile", full)
+        doubling = compiled(double)
+    assert doubling(3.0) == 6.0
