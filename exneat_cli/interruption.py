@@ -73,6 +73,36 @@ def finishing() -> Iterator[None]:
             raise Interrupted(number)
 
 
+@contextlib.contextmanager
+def unheard_by_children() -> Iterator[None]:
+    """Processes that are started meanwhile do not hear Ctrl-C, which a terminal sends to all; this one still does.
+
+    They would each end with a traceback, while whoever started them ends them anyway.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over = threading.Event()
+    waiting = threading.Thread(target=_pass_on, args=(over,), daemon=True)
+    before = signal.signal(signal.SIGUSR1, lambda _, frame: _hear(signal.SIGINT, frame))
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    waiting.start()
+    try:
+        yield
+    finally:
+        over.set()
+        waiting.join()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGUSR1, before)
+
+
+def _pass_on(over: threading.Event) -> None:
+    """Wait for SIGINT, which no other thread hears meanwhile, and wake the main thread."""
+    while not over.is_set():
+        if signal.sigtimedwait({signal.SIGINT}, _PAUSE) is not None:
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
+
+
 def _hear(number: int, frame: object) -> None:
     if _Heard.first is not None:
         _end(number)

@@ -127,3 +127,26 @@ def test_a_process_that_swallows_the_exception_is_ended_with_the_line_that_says_
     done = in_process(SWALLOWED)
     assert done.returncode == 130
     assert done.stderr.startswith("exneat: interrupted; the same command goes on")
+
+
+UNHEARD = """
+import os, signal, subprocess, sys, time
+from exneat_cli.interruption import Interrupted, listen, unheard_by_children
+listen()
+try:
+    with unheard_by_children():
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+        time.sleep(0.5)
+        os.killpg(0, signal.SIGINT)
+        time.sleep(60)
+except Interrupted as interrupted:
+    print(interrupted.number == signal.SIGINT, child.poll())
+    child.kill()
+"""
+
+
+def test_children_do_not_hear_ctrl_c_where_they_must_not_and_their_parent_does() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", UNHEARD], capture_output=True, text=True, timeout=50, check=False, start_new_session=True
+    )
+    assert (done.stdout, done.stderr) == ("True None\n", "")

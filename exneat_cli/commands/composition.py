@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from exneat_cli.commands.complaints import in_our_words
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.commands.own_files import check_own_files, without_marks
 from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.interruption import unheard_by_children
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
@@ -88,7 +89,9 @@ def run_composed(
         with tempfile.TemporaryDirectory() as scratch, keep_clusters():
             flags = [without_marks(flag, Path(scratch)) for flag in flags]
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
-            hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
+            elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
+            with unheard_by_children() if elsewhere else contextlib.nullcontext():
+                hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
     except SystemExit as stop:
         if stop.code:
             raise ExneatError(f"{program}: the flags make no sense to Hydra, see {program} --hydra-help") from stop
@@ -126,7 +129,7 @@ def plain_from(config: DictConfig) -> dict[str, Any]:
     return {str(key): value for key, value in plain.items()}
 
 
-@contextmanager
+@contextlib.contextmanager
 def composing() -> Iterator[Callable[[Sequence[str]], DictConfig]]:
     """Gives a function from overrides to the composed configuration, for many compositions in a row.
 
