@@ -53,6 +53,12 @@ def listen() -> None:
         signal.signal(number, _hear)
 
 
+def stop_listening() -> None:
+    """Let no signal end a process that is done: Python would let it, with another exit code, while it tidies up."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
 @contextlib.contextmanager
 def finishing() -> Iterator[None]:
     """Put `Interrupted` off until the block is done, if this is the main thread.

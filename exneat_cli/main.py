@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import GOES_ON, listen
+from exneat_cli.interruption import GOES_ON, listen, stop_listening
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -58,6 +58,13 @@ usage: exneat <command> [key=value ...]
 def _printable(message: str) -> str:
     """The message with control characters spelled out: what a stranger wrote must not steer the terminal."""
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in message)
+
+
+def program() -> int:
+    """What the installed program calls: `main`, after which a late signal changes nothing."""
+    code = main()
+    stop_listening()
+    return code
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

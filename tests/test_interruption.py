@@ -150,3 +150,14 @@ def test_children_do_not_hear_ctrl_c_where_they_must_not_and_their_parent_does()
         [sys.executable, "-c", UNHEARD], capture_output=True, text=True, timeout=50, check=False, start_new_session=True
     )
     assert (done.stdout, done.stderr) == ("True None\n", "")
+
+
+def test_a_process_that_is_done_ends_with_its_own_exit_code_whatever_comes_late() -> None:
+    done = in_process("""
+        from exneat_cli.interruption import stop_listening
+        stop_listening()
+        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGINT)
+        raise SystemExit(7)
+    """)
+    assert done.returncode == 7

@@ -63,7 +63,7 @@ def test_the_wheel_asks_for_every_library_that_it_imports(unpacked: Path) -> Non
 
 def test_the_wheel_installs_the_program(unpacked: Path) -> None:
     (entry_points,) = unpacked.glob("*.dist-info/entry_points.txt")
-    assert "exneat = exneat_cli.main:main" in entry_points.read_text()
+    assert "exneat = exneat_cli.main:program" in entry_points.read_text()
 
 
 def test_the_wheel_trains_away_from_the_repository(unpacked: Path, tmp_path: Path) -> None:

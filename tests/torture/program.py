@@ -16,7 +16,7 @@ import exneat_cli
 
 HANGING = 180.0
 """Seconds after which a process that should end by itself is taken for stuck."""
-START = "import sys; from exneat_cli.main import main; sys.exit(main())"
+START = "import sys; from exneat_cli.main import program; sys.exit(program())"
 """What an installed `exneat` does, for any interpreter."""
 _POLL = 0.002
 
