@@ -4,16 +4,13 @@ from exneat_cli.records import disk, provenance
 from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.champion_data import plan_from_data, read_champion_data
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
-from exneat_cli.records.files import make_directory, read_json, read_text, write_csv, write_json, write_whole
+from exneat_cli.records.files import make_directory, read_json, write_csv, write_json, write_whole
 from exneat_cli.records.history import HistoryRow, write_history
 from exneat_cli.records.locks import is_held
+from exneat_cli.records.manifest_data import DONE, FAILED, INTERRUPTED, RUNNING
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
-    DONE,
-    FAILED,
-    INTERRUPTED,
     MANIFEST_FORMAT,
-    RUNNING,
     Claim,
     RunDirectory,
     configuration_hash,
@@ -48,7 +45,6 @@ __all__ = [
     "read_checkpoints",
     "read_json",
     "read_robustness",
-    "read_text",
     "read_yaml",
     "write_champion",
     "write_checkpoint",

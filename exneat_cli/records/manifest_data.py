@@ -9,7 +9,9 @@ from typing import Any
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real, check_whole
 from exneat_cli.records.files import read_json
 
-STATUSES = ("running", "done", "failed", "interrupted")
+RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
+STATUSES = (RUNNING, DONE, FAILED, INTERRUPTED)
+"""What a manifest's status can be."""
 _WHOLE = ("format", "generations", "process", "seed")
 _WORDS = ("arm", "task", "configuration_hash", "started", "finished")
 _FIGURES = ("fitness_mean", "fitness_std", "full_reward_mean")

@@ -15,11 +15,8 @@ from typing import Any
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, delete_orphans, write_json, write_whole
 from exneat_cli.records.locks import held
-from exneat_cli.records.manifest_data import read_manifest_data, result_of
+from exneat_cli.records.manifest_data import DONE, read_manifest_data, result_of
 from exneat_cli.records.yaml_files import read_yaml
-
-RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
-"""What a manifest's status can be."""
 
 MANIFEST_FORMAT = 2
 

@@ -1,14 +1,13 @@
 """The hot room: runs episodes and returns what came out of them; writes nothing."""
 
 from exneat_cli.rollouts.cluster import keep_clusters
-from exneat_cli.rollouts.executor import EXECUTORS, Executor
+from exneat_cli.rollouts.executor import Executor
 from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Outcomes, Trace
 from exneat_cli.rollouts.robustness import Sweep, perturbed, run_levels
 from exneat_cli.rollouts.runner import Runner
 
 __all__ = [
-    "EXECUTORS",
     "Executor",
     "Noise",
     "Outcomes",

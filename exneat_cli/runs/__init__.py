@@ -1,13 +1,12 @@
 """The story of a run: training, validation, test, robustness. Works from plain objects, without Hydra."""
 
-from exneat_cli.runs.progress import Bar, Lines, Progress, Silence, progress_for_terminal
+from exneat_cli.runs.progress import Lines, Progress, Silence, progress_for_terminal
 from exneat_cli.runs.robustness import check_sweeps, is_finished, load_settings, run_robustness
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
 from exneat_cli.runs.settings import RunSettings, executor_from
 
 __all__ = [
-    "Bar",
     "Finished",
     "Lines",
     "Progress",
