@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -70,8 +71,11 @@ def run_composed(
         ExneatError: the configuration cannot be composed, or `job` raised it.
     """
     raised: list[BaseException] = []
+    asked_by = os.getpid()
 
     def guarded(config: DictConfig) -> None:
+        if os.getpid() != asked_by:  # a launcher's worker: whoever started it hears Ctrl-C, and ends it
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
             job(config)
         except BaseException as error:
