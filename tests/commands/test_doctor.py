@@ -68,7 +68,7 @@ def test_everything_is_looked_at_and_nothing_is_left_behind(ask: Ask, tmp_path: 
     _, states, printed = ask()
     required = [text for text in metadata.requires("exneat") or [] if "extra ==" not in text]
     assert len(required) > 10
-    for name in ("python", "extra joblib", "extra dask", "extra submitit", "loading", "processor", "memory"):
+    for name in ("python", "extra joblib", "extra dask", "extra slurm", "loading", "processor", "memory"):
         assert name in states, printed
     for name in ("compiled MuJoCo", "rendering", "compile cache", "output root", "locks", "disk space"):
         assert name in states, printed
@@ -127,7 +127,7 @@ def test_a_version_that_is_none_is_a_line_of_its_own(ask: Ask, monkeypatch: pyte
 def test_an_extra_may_be_missing_but_not_of_another_version(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, hydra_joblib_launcher=None, hydra_submitit_launcher="1.1.0")
     code, states, printed = ask()
-    assert (code, states["extra joblib"], states["extra submitit"]) == (0, findings.OK, findings.DEGRADED)
+    assert (code, states["extra joblib"], states["extra slurm"]) == (0, findings.OK, findings.DEGRADED)
     assert "not installed; for runs side by side on one machine:" in printed
     assert "pip install hydra-joblib-launcher==1.2.0" in printed
 
