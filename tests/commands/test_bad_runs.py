@@ -170,7 +170,7 @@ COMMANDS = [
     (["sweep", "experiment=track_maze", "~seed"], ["~seed: a setting cannot be deleted"]),
     (["sweep", "experiment=track_maze", "noise.sensor_std=nan"], ["noise.sensor_std: expected", "nan"]),
     (["sweep", "experiment=track_maze", "task=../x"], ["task: expected the name of an option"]),
-    (["sweep", "experiment=track_maze", "hydra.sweep.dir=x"], ["exneat sets hydra.sweep itself"]),
+    (["sweep", "experiment=track_maze", "hydra.sweep.subdir=x"], ["exneat sets hydra.sweep.subdir itself"]),
 ]
 
 
