@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains.brain import Brain, Brains
-from exneat_cli.brains.expression import Networks, express
+from exneat_cli.brains.expression import express
 from exneat_cli.brains.wiring_arrays import WiringArrays, wiring_arrays
 from exneat_cli.evolution import ArrayGenome
 from exneat_cli.evolution.structure import row_of
@@ -38,74 +37,63 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
     if any(len(team) != members for team in teams):
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
     networks = express(wiring, [genome for team in teams for genome in team], feed_forward=feed_forward)
-    slots = networks.slots.reshape(-1, members)[:, wiring.subpopulation]
+    slots, evaluated, connections = (
+        each.reshape(-1, members)[:, wiring.subpopulation]
+        for each in (networks.slots, networks.evaluated, np.diff(networks.first_connection))
+    )
     bases = np.full((len(teams), len(wiring.subpopulation) + 1), wiring.observation_size)
     bases[:, 1:] += np.cumsum(slots, axis=1)
-    # One memory layout, whatever the number of teams: compiled code is compiled for each.
-    pin_slot = np.ascontiguousarray(np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index)
     # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
     # slot still holds the previous step's value anyway.
     copied = wiring.pin_delayed & feed_forward
-    link_source = pin_slot[:, copied]
-    link_slot = bases[:, -1:] + np.arange(np.count_nonzero(copied))
-    pin_slot[:, copied] = link_slot
-    size = bases[:, -1] + np.count_nonzero(copied) + 1
+    pin_slot, link_slot, link_source = _pin_slots(wiring, bases, copied)
+    size = bases[:, -1] + link_slot.shape[1] + 1
     output_slot = np.where(wiring.driver < 0, size[:, None] - 1, bases[:, wiring.driver] + wiring.driver_output)
-    return Brains(
+    nodes, most_edges = int(evaluated.sum()), int(connections.sum())
+    brains = Brains(
         observation_size=plan.observation_size,
         size=size,
         recurrent=np.full(len(teams), not feed_forward),
-        first_link=np.arange(len(teams) + 1) * np.count_nonzero(copied),
+        first_node=np.cumsum([0, *evaluated.sum(axis=1)]),
+        first_link=np.arange(len(teams) + 1) * link_slot.shape[1],
+        node_slot=np.zeros(nodes, np.int64),
+        edge_start=np.zeros(nodes + 1, np.int64),
+        edge_source=np.zeros(most_edges, np.int64),
+        edge_weight=np.zeros(most_edges),
+        bias=np.zeros(nodes),
+        response=np.zeros(nodes),
+        activation=np.zeros(nodes, np.int64),
         link_slot=link_slot.ravel(),
         link_source=link_source.ravel(),
         output_slot=np.ascontiguousarray(output_slot),
-        **_join(wiring, networks, bases, pin_slot)._asdict(),
     )
+    edges = _fill(wiring, networks, bases, pin_slot, brains)
+    return brains._replace(edge_source=brains.edge_source[:edges], edge_weight=brains.edge_weight[:edges])
 
 
-class _Joined(NamedTuple):
-    """The fields of `Brains` that hold nodes and edges."""
+def _pin_slots(
+    wiring: WiringArrays, bases: NDArray[np.int64], copied: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The slot that each pin reads, (T, P), and those that copies are made into and of, (T, L) each."""
+    # One memory layout, whatever the number of teams: compiled code is compiled for each.
+    pin_slot = np.ascontiguousarray(np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index)
+    link_source = pin_slot[:, copied]
+    link_slot = bases[:, -1:] + np.arange(np.count_nonzero(copied))
+    pin_slot[:, copied] = link_slot
+    return pin_slot, link_slot, link_source
 
-    first_node: NDArray[np.int64]
-    node_slot: NDArray[np.int64]
-    edge_start: NDArray[np.int64]
-    edge_source: NDArray[np.int64]
-    edge_weight: NDArray[np.float64]
-    bias: NDArray[np.float64]
-    response: NDArray[np.float64]
-    activation: NDArray[np.int64]
 
-
-def _join(wiring: WiringArrays, networks: Networks, bases: NDArray[np.int64], pin_slot: NDArray[np.int64]) -> _Joined:
-    """Networks of modules end to end, in slots of the whole brain.
+@compiled
+def _fill(wiring, networks, bases, pin_slot, brains):  # type: ignore[no-untyped-def]
+    """Write nodes and edges of `brains`; returns the number of edges.
 
     Args:
         wiring: the plan, of M modules and P pins.
         networks: of all teams.
         bases: (T, M + 1) the first slot of each module.
         pin_slot: (T, P) the slot that each pin reads.
+        brains: whose other fields are filled, with room for all edges.
     """
-    per_team = (-1, len(wiring.shapes))
-    evaluated = networks.evaluated.reshape(per_team)[:, wiring.subpopulation]
-    connections = np.diff(networks.first_connection).reshape(per_team)[:, wiring.subpopulation]
-    nodes = int(evaluated.sum())
-    joined = _Joined(
-        first_node=np.cumsum([0, *evaluated.sum(axis=1)]),
-        node_slot=np.zeros(nodes, np.int64),
-        edge_start=np.zeros(nodes + 1, np.int64),
-        edge_source=np.zeros(connections.sum(), np.int64),
-        edge_weight=np.zeros(connections.sum()),
-        bias=np.zeros(nodes),
-        response=np.zeros(nodes),
-        activation=np.zeros(nodes, np.int64),
-    )
-    edges = _fill(wiring, networks, bases, pin_slot, joined)
-    return joined._replace(edge_source=joined.edge_source[:edges], edge_weight=joined.edge_weight[:edges])
-
-
-@compiled
-def _fill(wiring, networks, bases, pin_slot, joined):  # type: ignore[no-untyped-def]
-    """Write all fields of `joined` but the first; returns the number of edges."""
     node = edge = 0
     for t in range(bases.shape[0]):
         for m in range(wiring.subpopulation.size):
@@ -116,18 +104,18 @@ def _fill(wiring, networks, bases, pin_slot, joined):  # type: ignore[no-untyped
             base = bases[t, m] - pins.size
             for row in networks.order[first_node : first_node + networks.evaluated[g]]:
                 gene = networks.nodes[first_node + row]
-                joined.node_slot[node] = base + networks.slot_of[first_node + row]
-                joined.bias[node] = gene.bias
-                joined.response[node] = gene.response
-                joined.activation[node] = gene.activation
+                brains.node_slot[node] = base + networks.slot_of[first_node + row]
+                brains.bias[node] = gene.bias
+                brains.response[node] = gene.response
+                brains.activation[node] = gene.activation
                 i = row_of(connections, gene.key, -pins.size)
                 while i < connections.size and connections[i].target == gene.key:
                     if connections[i].enabled:
                         source = networks.source_of[first_connection + i]
-                        joined.edge_source[edge] = pins[source] if source < pins.size else base + source
-                        joined.edge_weight[edge] = connections[i].weight
+                        brains.edge_source[edge] = pins[source] if source < pins.size else base + source
+                        brains.edge_weight[edge] = connections[i].weight
                         edge += 1
                     i += 1
                 node += 1
-                joined.edge_start[node] = edge
+                brains.edge_start[node] = edge
     return edge
