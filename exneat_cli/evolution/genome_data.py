@@ -10,6 +10,7 @@ import numpy as np
 
 from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE
+from exneat_cli.evolution.soundness import check_genes
 
 
 def genome_to_data(genome: ArrayGenome) -> dict[str, Any]:
@@ -54,20 +55,10 @@ def genome_from_data(data: dict[str, Any]) -> ArrayGenome:
         )
         for entry in data["connections"]
     ]
-    _check_ends({node[0] for node in nodes}, [connection[:2] for connection in connections])
-    if len({node[0] for node in nodes}) < len(nodes) or min((node[0] for node in nodes), default=0) < 0:
-        raise ValueError("expected nodes with different ids of at least 0")
     genome.nodes = np.array(sorted(nodes), NODE)
     genome.connections = np.array(sorted(connections), CONNECTION)
+    check_genes(genome.key, genome.nodes, genome.connections)
     return genome
-
-
-def _check_ends(nodes: set[int], ends: list[tuple[int, ...]]) -> None:
-    if len(set(ends)) < len(ends):
-        raise ValueError("expected at most one connection between two nodes")
-    for target, source in ends:
-        if target not in nodes or (source >= 0 and source not in nodes):
-            raise ValueError(f"the connection from {source} to {target} has an end that does not exist")
 
 
 def _activation(name: object) -> int:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from exneat_cli.evolution.array_genome import ArrayGenome
 from exneat_cli.evolution.conversion import stock_genome, tables_of
 from exneat_cli.evolution.genes import ACTIVATIONS, CONNECTION, NODE, end_to_end
+from exneat_cli.evolution.soundness import check_genes
 
 Columns = dict[str, NDArray[Any]]
 
@@ -82,14 +83,10 @@ def _genome(kind: type[Any], key: int, nodes: NDArray[np.void], connections: NDA
 
 
 def _check(key: int, nodes: NDArray[np.void], connections: NDArray[np.void], *, in_order: bool) -> None:
-    ends = list(zip(connections["target"].tolist(), connections["source"].tolist(), strict=True))
-    keys = nodes["key"].tolist()
-    if len(set(keys)) < len(keys) or len(set(ends)) < len(ends):
-        raise ValueError(f"genome {key}: a node or a connection comes twice")
-    if in_order and (keys != sorted(keys) or ends != sorted(ends)):
-        raise ValueError(f"genome {key}: genes are out of order")
-    known = set(keys)
-    if min(keys, default=0) < 0 or any(t not in known or (s >= 0 and s not in known) for t, s in ends):
-        raise ValueError(f"genome {key}: a connection has an end that does not exist")
+    check_genes(key, nodes, connections)
+    if in_order:
+        ordered = np.lexsort((connections["source"], connections["target"]))
+        if (np.diff(nodes["key"]) < 0).any() or (np.diff(ordered) < 0).any():
+            raise ValueError(f"genome {key}: genes are out of order")
     if not ((nodes["activation"] >= 0) & (nodes["activation"] < len(ACTIVATIONS))).all():
         raise ValueError(f"genome {key}: a node has an activation that does not exist")

@@ -3,6 +3,31 @@
 from __future__ import annotations
 
 from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.genes import Connections, Nodes
+
+
+def check_genes(key: int, nodes: Nodes, connections: Connections) -> None:
+    """Refuse genes, in any order, that make no graph.
+
+    Args:
+        key: of their genome.
+        nodes: (N,).
+        connections: (C,).
+
+    Raises:
+        ValueError: a node or connection comes twice, a node's key is below 0, or a connection has an end that does not
+            exist.
+    """
+    keys = nodes["key"].tolist()
+    ends = list(zip(connections["target"].tolist(), connections["source"].tolist(), strict=True))
+    known = set(keys)
+    if len(known) < len(keys) or min(keys, default=0) < 0:
+        raise ValueError(f"genome {key}: expected nodes with different ids of at least 0")
+    if len(set(ends)) < len(ends):
+        raise ValueError(f"genome {key}: expected at most one connection between two nodes")
+    for target, source in ends:
+        if target not in known or (source >= 0 and source not in known):
+            raise ValueError(f"genome {key}: the connection from {source} to {target} has an end that does not exist")
 
 
 def check_genome(genome: ArrayGenome, inputs: int, outputs: int, *, feed_forward: bool) -> None:
