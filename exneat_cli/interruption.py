@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
+import shutil
 import signal
+import socket
 import sys
+import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import ClassVar
 
 PATIENCE = 4.0
 """Seconds after which a process that was asked to end is ended."""
+_GRACE = 0.8
+"""Further seconds that a write in hand has then."""
 _PAUSE = 0.05
 """Seconds until a signal is sent again; it must not come up in the same callback."""
 GOES_ON = "exneat: interrupted; the same command goes on (a single exneat train with resume=true)"
@@ -33,21 +41,71 @@ class Interrupted(KeyboardInterrupt):
 class _Heard:
     """What is known of signals so far; handlers run in the main thread alone."""
 
-    first: int | None = None
-    watch: threading.Timer | None = None
+    watch: _Watch | None = None
     waiting: int | None = None
     writes_in_hand = 0
+    writing = threading.Lock()
+    through_others = False
+    scratch: ClassVar[set[Path]] = set()
+
+
+class _Watch:
+    """Hears signals in a thread of its own: the main thread hears none while it is in compiled code, or compiles.
+
+    It ends the process, and what that started, `PATIENCE` seconds after the first signal or upon a second one.
+    """
+
+    def __init__(self) -> None:
+        self._ear, self._mouth = socket.socketpair()
+        self._mouth.setblocking(False)
+        self._called_off = False
+        signal.set_wakeup_fd(self._mouth.fileno(), warn_on_full_buffer=False)
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def call_off(self) -> None:
+        """Let the process live, whatever was heard; the next watch must have been set up before."""
+        self._called_off = True
+        self._mouth.close()
+
+    def _listen(self) -> None:
+        with self._ear:
+            first = self._next(None)
+            second = self._next(PATIENCE) if first else 0
+        if self._called_off or not first:
+            return
+        if not second:
+            _Heard.writing.acquire(timeout=_GRACE)
+            with contextlib.suppress(OSError):
+                os.write(2, f"{GOES_ON}\n".encode())
+        _end(second or first)
+
+    def _next(self, seconds: float | None) -> int:
+        """Number of the next signal that `_hear` is there for; 0 if none came in time, or the watch was called off."""
+        until = None if seconds is None else time.monotonic() + seconds
+        while self._speaks(None if until is None else max(until - time.monotonic(), 0.0)):
+            number = self._ear.recv(1)
+            if not number:
+                return 0
+            if signal.getsignal(number[0]) is _hear:
+                if _Heard.through_others:
+                    signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGURG)
+                return number[0]
+        return 0
+
+    def _speaks(self, seconds: float | None) -> bool:
+        return bool(select.select([self._ear], [], [], seconds)[0])
 
 
 def listen() -> None:
     """Turn Ctrl-C and SIGTERM into `Interrupted` from now on; a second one ends the process at once.
 
     A process that is still there after `PATIENCE` is ended too, with what it started: libraries may swallow
-    an exception that comes from a signal.
+    an exception that comes from a signal, and compiled code hears none.
     """
-    if _Heard.watch is not None:
-        _Heard.watch.cancel()
-    _Heard.first = _Heard.waiting = _Heard.watch = None
+    before, _Heard.watch = _Heard.watch, _Watch()
+    if before is not None:
+        before.call_off()
+    _Heard.waiting = None
     sys.unraisablehook = _hear_again
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _hear)
@@ -70,52 +128,50 @@ def finishing() -> Iterator[None]:
         yield
         return
     _Heard.writes_in_hand += 1
+    outermost = _Heard.writes_in_hand == 1
     try:
-        yield
+        with _Heard.writing if outermost else contextlib.nullcontext():
+            yield
     finally:
         _Heard.writes_in_hand -= 1
-        if _Heard.waiting is not None and _Heard.writes_in_hand == 0:
+        if _Heard.waiting is not None and outermost:
             number, _Heard.waiting = _Heard.waiting, None
             raise Interrupted(number)
+
+
+@contextlib.contextmanager
+def scratch_directory() -> Iterator[Path]:
+    """A new directory for temporary files; it is deleted with the block, also where the process is ended amid it."""
+    with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as name:
+        _Heard.scratch.add(Path(name))
+        try:
+            yield Path(name)
+        finally:
+            _Heard.scratch.discard(Path(name))
 
 
 @contextlib.contextmanager
 def unheard_by_children() -> Iterator[None]:
     """Processes that are started meanwhile do not hear Ctrl-C, which a terminal sends to all; this one still does.
 
-    They would each end with a traceback, while whoever started them ends them anyway.
+    They would each end with a traceback, while whoever started them ends them anyway. Children inherit what the main
+    thread blocks, so another thread takes the signal, and the watch wakes the main one by SIGURG, which nobody uses.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    over = threading.Event()
-    waiting = threading.Thread(target=_pass_on, args=(over,), daemon=True)
-    before = signal.signal(signal.SIGUSR1, lambda _, frame: _hear(signal.SIGINT, frame))
+    before = signal.signal(signal.SIGURG, lambda *_: None)
+    _Heard.through_others = True
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    waiting.start()
     try:
         yield
     finally:
-        over.set()
-        waiting.join()
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        signal.signal(signal.SIGUSR1, before)
+        _Heard.through_others = False
+        signal.signal(signal.SIGURG, before)
 
 
-def _pass_on(over: threading.Event) -> None:
-    """Wait for SIGINT, which no other thread hears meanwhile, and wake the main thread."""
-    while not over.is_set():
-        if signal.sigtimedwait({signal.SIGINT}, _PAUSE) is not None:
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
-
-
-def _hear(number: int, frame: object) -> None:
-    if _Heard.first is not None:
-        _end(number)
-    _Heard.first = number
-    _Heard.watch = threading.Timer(PATIENCE, _give_up, (number,))
-    _Heard.watch.daemon = True
-    _Heard.watch.start()
+def _hear(number: int, _: object) -> None:
     if _Heard.writes_in_hand:
         _Heard.waiting = number
     else:
@@ -127,22 +183,20 @@ def _hear_again(lost: sys.UnraisableHookArgs) -> None:
     if not isinstance(lost.exc_value, Interrupted):
         sys.__unraisablehook__(lost)
         return
-    _Heard.first = None
+    listen()
     again = threading.Timer(_PAUSE, os.kill, (os.getpid(), lost.exc_value.number))
     again.daemon = True
     again.start()
 
 
-def _give_up(number: int) -> None:
-    with contextlib.suppress(OSError):
-        os.write(2, f"{GOES_ON}\n".encode())
-    _end(number)
-
-
 def _end(number: int) -> None:
     for process in _descendants(os.getpid()):
         with contextlib.suppress(OSError):
-            os.kill(process, signal.SIGKILL)
+            # A resource tracker ends with whoever started it, and takes the temporary files with it.
+            if b"resource_tracker" not in Path(f"/proc/{process}/cmdline").read_bytes():
+                os.kill(process, signal.SIGKILL)
+    for path in tuple(_Heard.scratch):
+        shutil.rmtree(path, ignore_errors=True)
     os._exit(128 + number)
 
 

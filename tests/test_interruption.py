@@ -64,7 +64,7 @@ def test_a_second_signal_ends_the_process_at_once_even_in_the_midst_of_a_write()
             os.kill(os.getpid(), signal.SIGINT)
             print("still writing", flush=True)
             os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.1)
+            time.sleep(60)
             print("never", flush=True)
     """)
     assert done.stdout == "still writing\n"
@@ -161,3 +161,61 @@ def test_a_process_that_is_done_ends_with_its_own_exit_code_whatever_comes_late(
         raise SystemExit(7)
     """)
     assert done.returncode == 7
+
+
+IN_COMPILED_CODE = """
+import hashlib, os, signal, threading
+from exneat_cli import interruption
+
+interruption.PATIENCE = {patience}
+interruption.listen()
+with interruption.scratch_directory() as scratch:
+    (scratch / "file").write_text("temporary")
+    print(scratch, flush=True)
+    for seconds in {moments}:
+        threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+"""The main thread is in code that neither looks for signals nor ends within minutes."""
+
+
+@pytest.mark.parametrize(
+    ("patience", "moments"), [pytest.param(0.2, [0.1], id="one"), pytest.param(600.0, [0.1, 0.2], id="two")]
+)
+def test_a_main_thread_in_compiled_code_is_ended_and_its_temporary_files_deleted(
+    patience: float, moments: list[float]
+) -> None:
+    done = in_process(IN_COMPILED_CODE.format(patience=patience, moments=moments))
+    assert done.returncode == 143
+    assert not Path(done.stdout.strip()).exists()
+    assert ("goes on" in done.stderr) == (len(moments) == 1)
+
+
+def test_a_process_is_not_ended_amid_a_write() -> None:
+    done = in_process("""
+        from exneat_cli import interruption
+        interruption.PATIENCE, interruption._GRACE = 0.1, 60.0
+        try:
+            with finishing():
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(0.4)
+                print("written", flush=True)
+        except KeyboardInterrupt:
+            time.sleep(60)
+    """)
+    assert (done.stdout, done.returncode) == ("written\n", 143)
+
+
+def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
+    done = in_process("""
+        from exneat_cli import interruption
+        interruption.PATIENCE = 0.1
+        for _ in range(3):
+            try:
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(60)
+            except KeyboardInterrupt:
+                listen()
+        time.sleep(0.3)
+    """)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from exneat_cli.commands.complaints import in_our_words
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.commands.own_files import check_own_files, without_marks
 from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.interruption import unheard_by_children
+from exneat_cli.interruption import scratch_directory, unheard_by_children
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
@@ -90,8 +89,8 @@ def run_composed(
     check_overrides(overrides, configuration_directory())
     try:
         # Jobs that are done one after the other share a cluster: starting one takes seconds.
-        with tempfile.TemporaryDirectory() as scratch, keep_clusters():
-            flags = [without_marks(flag, Path(scratch)) for flag in flags]
+        with scratch_directory() as scratch, keep_clusters():
+            flags = [without_marks(flag, scratch) for flag in flags]
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
             elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
             with unheard_by_children() if elsewhere else contextlib.nullcontext():

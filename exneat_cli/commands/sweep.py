@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import tempfile
 import time
 import traceback
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from exneat_cli.commands.drawing import draw_what_is_missing
 from exneat_cli.commands.experiments import Experiment, Job, budget_of, plan_jobs, read_experiment
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import scratch_directory
 from exneat_cli.records import DONE
 from exneat_cli.runs import Silence, progress_for_terminal, run_robustness, train
 
@@ -39,8 +39,8 @@ def run(arguments: Sequence[str]) -> int:
     pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     done_before = len(jobs) - len(pending)
     print(f"{experiment.name}, budget {budget}: {len(jobs)} runs, {done_before} of them finished before", flush=True)
-    with tempfile.TemporaryDirectory() as notes:
-        launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], Path(notes))
+    with scratch_directory() as notes:
+        launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], notes)
         if pending:
             _launch(launch, for_hydra)
         return _summarise(experiment, launch, done_before)

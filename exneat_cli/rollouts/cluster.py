@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import logging
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import scratch_directory
 from exneat_cli.rollouts.executor import Executor
 
 CONNECT_SECONDS = 8
@@ -125,9 +125,7 @@ class Cluster:
     def _start(self, workers: int) -> Any:
         from distributed import Client, LocalCluster
 
-        scratch = self._ending.enter_context(
-            tempfile.TemporaryDirectory(prefix="exneat-dask-", ignore_cleanup_errors=True)
-        )
+        scratch = self._ending.enter_context(scratch_directory())
         cluster = LocalCluster(
             n_workers=0,  # those that `scale` adds come up while the caller goes on
             threads_per_worker=1,
@@ -136,7 +134,7 @@ class Cluster:
             dashboard_address=None,
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             memory_limit=0,
-            local_directory=scratch,
+            local_directory=str(scratch),
             silence_logs=logging.CRITICAL,
             config={"distributed.worker.profile.enabled": False},
         )
