@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from exneat_cli.records import RunDirectory
 
 
 def missing_figures(directory: RunDirectory, *, swept: bool) -> list[str]:
     """Names of the figures that a finished run has data for, but no picture, or one older than its data."""
-    lacks = {name: not (directory.plots / f"{name}.svg").exists() for name in ("training", "path", "network")}
-    lacks["training"] &= directory.history.exists()
-    lacks["network"] &= directory.champion.exists()
-    picture, data = directory.plots / "robustness.svg", directory.robustness
-    up_to_date = picture.exists() and data.exists() and picture.stat().st_mtime >= data.stat().st_mtime
-    lacks["robustness"] = swept and data.exists() and not up_to_date
-    return [name for name, lacking in lacks.items() if lacking]
+    data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
+    if swept:
+        data["robustness"] = directory.robustness
+    return [name for name, source in data.items() if _is_missing(directory.plots / f"{name}.svg", source)]
+
+
+def _is_missing(picture: Path, data: Path) -> bool:
+    return data.exists() and not (picture.exists() and picture.stat().st_mtime >= data.stat().st_mtime)
 
 
 def draw_what_is_missing(directory: RunDirectory, fitness_name: str, labels: Mapping[str, str]) -> None:
@@ -25,17 +27,21 @@ def draw_what_is_missing(directory: RunDirectory, fitness_name: str, labels: Map
         directory: of a finished run.
         fitness_name: label of the fitness axis.
         labels: of the axes of robustness sweeps, by name.
+
+    Raises:
+        ExneatError: another process holds the directory, or a figure cannot be written.
     """
-    missing = missing_figures(directory, swept=bool(labels))
-    if not missing:
+    if not missing_figures(directory, swept=bool(labels)):
         return
     from exneat_cli.analysis import draw_network, draw_path, draw_robustness, draw_training
 
-    if "training" in missing:
-        draw_training(directory, fitness_name)
-    if "path" in missing:
-        draw_path(directory)
-    if "network" in missing:
-        draw_network(directory)
-    if "robustness" in missing:
-        draw_robustness(directory, labels, fitness_name)
+    with directory.held():  # nobody may change the data between reading and drawing
+        missing = missing_figures(directory, swept=bool(labels))
+        if "training" in missing:
+            draw_training(directory, fitness_name)
+        if "path" in missing:
+            draw_path(directory)
+        if "network" in missing:
+            draw_network(directory)
+        if "robustness" in missing:
+            draw_robustness(directory, labels, fitness_name)

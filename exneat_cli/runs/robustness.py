@@ -6,7 +6,7 @@ the same for all arms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brain, RandomActions
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
@@ -132,15 +132,18 @@ def run_robustness(
                 for level, outcomes in run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
             }
             rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
+            # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+            _count_failures(
+                directory, {f"{sweep.name}={level:g}": each.failed_episodes for level, each in scores.items()}
+            )
             merge_robustness(directory.robustness, rows)
-            _count_failures(directory, sweep.name, sum(each.failed_episodes for each in scores.values()))
             done += len(rows)
     return done
 
 
-def _count_failures(directory: RunDirectory, sweep: str, failed: int) -> None:
-    counted = directory.read_manifest().get("failed_robustness_episodes", {})
-    directory.update_manifest(failed_robustness_episodes={**counted, sweep: counted.get(sweep, 0) + failed})
+def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
+    counted = {**directory.read_manifest().get("failed_robustness_episodes", {}), **failed}
+    directory.update_manifest(failed_robustness_episodes={key: count for key, count in counted.items() if count})
 
 
 def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:

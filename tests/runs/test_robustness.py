@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import read_champion, read_robustness
-from exneat_cli.rollouts import Executor, Noise, Runner, Sweep
-from exneat_cli.runs import RunSettings, is_finished, run_robustness, train
+from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner, Sweep
+from exneat_cli.runs import RunSettings, is_finished, robustness, run_robustness, train
 from exneat_cli.runs.robustness import missing_levels
+from exneat_cli.runs.scores import Score, score_all
 from exneat_cli.seeding import shared_episodes
 from exneat_cli.tasks import Hunting
 
@@ -64,3 +66,24 @@ def test_a_run_that_another_process_holds_is_refused(tmp_path: Path) -> None:
     with directory.held(), pytest.raises(ExneatError, match="another process is writing there"):
         run_robustness(directory, [sweep], episodes=2, executor=SERIAL)
     assert not directory.robustness.exists()
+
+
+def test_failed_episodes_of_a_level_are_counted_once_though_its_rows_were_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    directory = train(a_run(tmp_path)).directory
+    sweep = Sweep("p_m", "task.p_m", (0.0, 0.5))
+
+    def failing(outcomes: Outcomes) -> list[Score]:
+        return [replace(score, failed_episodes=2) for score in score_all(outcomes)]
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(robustness, "score_all", failing)
+    with monkeypatch.context() as killed:
+        killed.setattr(robustness, "merge_robustness", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            run_robustness(directory, [sweep], episodes=3, executor=SERIAL)
+    assert run_robustness(directory, [sweep], episodes=3, executor=SERIAL) == 2
+    assert directory.read_manifest()["failed_robustness_episodes"] == {"p_m=0": 2, "p_m=0.5": 2}

@@ -1,0 +1,53 @@
+"""Which figures of a run are drawn, and when."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.commands.drawing import draw_what_is_missing, missing_figures
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import RunDirectory
+
+NAMES = ["training", "path", "network", "robustness"]
+
+
+@pytest.fixture
+def drawn(tmp_path: Path) -> RunDirectory:
+    """A directory with all data and all figures, as far as their names and times go."""
+    directory = RunDirectory(tmp_path)
+    directory.plots.mkdir()
+    data = (directory.history, directory.trace, directory.champion, directory.robustness)
+    for path in data:
+        path.touch()
+        os.utime(path, (1000, 1000))
+    for name in NAMES:
+        (directory.plots / f"{name}.svg").touch()
+    return directory
+
+
+def test_what_is_drawn_already_is_not_missing(drawn: RunDirectory) -> None:
+    assert missing_figures(drawn, swept=True) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_figure_that_is_not_there_or_older_than_its_data_is_missing(drawn: RunDirectory, name: str) -> None:
+    picture = drawn.plots / f"{name}.svg"
+    os.utime(picture, (999, 999))
+    assert missing_figures(drawn, swept=True) == [name]
+    picture.unlink()
+    assert missing_figures(drawn, swept=True) == [name]
+
+
+def test_a_figure_without_data_is_not_missing(tmp_path: Path) -> None:
+    assert missing_figures(RunDirectory(tmp_path), swept=True) == []
+
+
+def test_nothing_is_drawn_while_another_process_may_change_the_data(drawn: RunDirectory) -> None:
+    picture = drawn.plots / "training.svg"
+    picture.unlink()
+    with drawn.held(), pytest.raises(ExneatError, match="another process is writing there"):
+        draw_what_is_missing(drawn, "fitness", {})
+    assert not picture.exists()
