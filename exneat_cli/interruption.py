@@ -160,8 +160,11 @@ def unheard_by_children() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    from multiprocessing import resource_tracker  # here, for it takes longer to import than --help to answer
+
     before = signal.signal(signal.SIGURG, lambda *_: None)
     _Heard.through_others = True
+    resource_tracker.ensure_running()  # its first start would undo the next line
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -131,10 +131,12 @@ def test_a_process_that_swallows_the_exception_is_ended_with_the_line_that_says_
 
 UNHEARD = """
 import os, signal, subprocess, sys, time
+from multiprocessing import resource_tracker
 from exneat_cli.interruption import Interrupted, listen, unheard_by_children
 listen()
 try:
     with unheard_by_children():
+        resource_tracker.ensure_running()
         child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
         time.sleep(0.5)
         os.killpg(0, signal.SIGINT)

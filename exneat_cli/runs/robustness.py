@@ -21,7 +21,7 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import baseline, robustness_row, score_all, unseen_episodes
+from exneat_cli.runs.scores import Score, baseline, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.wiring import UNTRAINED
 
@@ -127,18 +127,17 @@ def run_robustness(
             (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             todo = Sweep(sweep.name, sweep.parameter, levels)
             seeds = unseen_episodes(settings, episodes)
-            scores = {
-                level: score_all(outcomes)[0]
-                for level, outcomes in run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
-            }
-            rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
-            # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
-            _count_failures(
-                directory, {f"{sweep.name}={level:g}": each.failed_episodes for level, each in scores.items()}
-            )
-            merge_robustness(directory.robustness, rows)
-            done += len(rows)
+            tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
+            _write(directory, settings, sweep, {level: score_all(outcomes)[0] for level, outcomes in tested})
+            done += len(levels)
     return done
+
+
+def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores: Mapping[float, Score]) -> None:
+    # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+    _count_failures(directory, {f"{sweep.name}={level:g}": each.failed_episodes for level, each in scores.items()})
+    rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
+    merge_robustness(directory.robustness, rows)
 
 
 def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
