@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import select
 import shutil
@@ -21,7 +22,7 @@ PATIENCE = 4.0
 _GRACE = 0.8
 """Further seconds that a write in hand has then."""
 _PAUSE = 0.05
-"""Seconds until a signal is sent again; it must not come up in the same callback."""
+"""Seconds until a signal is sent again, or the main thread woken again."""
 GOES_ON = "exneat: interrupted; the same command goes on (a single exneat train with resume=true)"
 """The last line of whoever was interrupted."""
 
@@ -42,6 +43,7 @@ class _Heard:
     """What is known of signals so far; handlers run in the main thread alone."""
 
     watch: _Watch | None = None
+    raised: int | None = None
     waiting: int | None = None
     writes_in_hand = 0
     writing = threading.Lock()
@@ -69,7 +71,7 @@ class _Watch:
 
     def _listen(self) -> None:
         with self._ear:
-            first = self._next(None)
+            first = self._next(math.inf)
             second = self._next(PATIENCE) if first else 0
         if self._called_off or not first:
             return
@@ -79,21 +81,20 @@ class _Watch:
                 os.write(2, f"{GOES_ON}\n".encode())
         _end(second or first)
 
-    def _next(self, seconds: float | None) -> int:
+    def _next(self, seconds: float) -> int:
         """Number of the next signal that `_hear` is there for; 0 if none came in time, or the watch was called off."""
-        until = None if seconds is None else time.monotonic() + seconds
-        while self._speaks(None if until is None else max(until - time.monotonic(), 0.0)):
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            if not select.select([self._ear], [], [], None if left == math.inf else _PAUSE)[0]:
+                _wake_main_thread()
+                continue
             number = self._ear.recv(1)
             if not number:
                 return 0
             if signal.getsignal(number[0]) is _hear:
-                if _Heard.through_others:
-                    signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGURG)
+                _wake_main_thread()
                 return number[0]
         return 0
-
-    def _speaks(self, seconds: float | None) -> bool:
-        return bool(select.select([self._ear], [], [], seconds)[0])
 
 
 def listen() -> None:
@@ -105,7 +106,7 @@ def listen() -> None:
     before, _Heard.watch = _Heard.watch, _Watch()
     if before is not None:
         before.call_off()
-    _Heard.waiting = None
+    _Heard.raised = _Heard.waiting = None
     sys.unraisablehook = _hear_again
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _hear)
@@ -135,8 +136,23 @@ def finishing() -> Iterator[None]:
     finally:
         _Heard.writes_in_hand -= 1
         if _Heard.waiting is not None and outermost:
-            number, _Heard.waiting = _Heard.waiting, None
-            raise Interrupted(number)
+            _Heard.raised, _Heard.waiting = _Heard.waiting, None
+            raise Interrupted(_Heard.raised)
+
+
+@contextlib.contextmanager
+def heeding() -> Iterator[None]:
+    """Whatever error leaves the block after a signal is `Interrupted`: libraries make others of it, as in a C callback.
+
+    Raises:
+        Interrupted: instead of that error.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _Heard.raised is None:
+            raise
+        raise Interrupted(_Heard.raised) from error
 
 
 @contextlib.contextmanager
@@ -174,10 +190,17 @@ def unheard_by_children() -> Iterator[None]:
         signal.signal(signal.SIGURG, before)
 
 
+def _wake_main_thread() -> None:
+    """End its waiting, if another thread took the signal; once may be too early, when it is just about to wait."""
+    if _Heard.through_others and _Heard.raised is None and _Heard.waiting is None:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGURG)
+
+
 def _hear(number: int, _: object) -> None:
     if _Heard.writes_in_hand:
         _Heard.waiting = number
     else:
+        _Heard.raised = number
         raise Interrupted(number)
 
 

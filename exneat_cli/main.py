@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import GOES_ON, listen, stop_listening
+from exneat_cli.interruption import GOES_ON, heeding, listen, stop_listening
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -89,7 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if rest in (["--help"], ["-h"]) and command in USAGE:
             print(USAGE[command])
             return 0
-        code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
+        with heeding():
+            code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
         return code
     except ExneatError as error:
         print(f"exneat: {_printable(str(error))}", file=sys.stderr)

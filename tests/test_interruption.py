@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from exneat_cli.interruption import Interrupted, finishing, listen
+from exneat_cli.interruption import Interrupted, finishing, heeding, listen
 
 
 @pytest.fixture
@@ -221,3 +221,22 @@ def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
         time.sleep(0.3)
     """)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.usefixtures("listening")
+def test_an_error_that_a_library_made_of_the_interruption_is_the_interruption_again() -> None:
+    def library() -> None:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise ValueError("Invalid bounding box") from None
+
+    with pytest.raises(Interrupted) as caught, heeding():
+        library()
+    assert caught.value.number == signal.SIGTERM
+
+
+@pytest.mark.usefixtures("listening")
+def test_an_error_without_a_signal_stays_what_it_is() -> None:
+    with pytest.raises(ValueError, match="its own"), heeding():
+        raise ValueError("its own")

@@ -21,7 +21,7 @@ from exneat_cli.commands.complaints import in_our_words
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.commands.own_files import check_own_files, without_marks
 from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.interruption import scratch_directory, unheard_by_children
+from exneat_cli.interruption import heeding, scratch_directory, unheard_by_children
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
@@ -76,7 +76,8 @@ def run_composed(
         if os.getpid() != asked_by:  # a launcher's worker: whoever started it hears Ctrl-C, and ends it
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
-            job(config)
+            with heeding():
+                job(config)
         except BaseException as error:
             raised.append(error)
             if isinstance(error, ExneatError) and HydraConfig.get().mode is not RunMode.MULTIRUN:

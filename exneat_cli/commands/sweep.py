@@ -17,7 +17,7 @@ from exneat_cli.commands.drawing import draw_what_is_missing
 from exneat_cli.commands.experiments import Experiment, Job, budget_of, plan_jobs, read_experiment
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import scratch_directory
+from exneat_cli.interruption import heeding, scratch_directory
 from exneat_cli.records import DONE
 from exneat_cli.runs import Silence, progress_for_terminal, run_robustness, train
 
@@ -102,7 +102,8 @@ class Launch:
         in_turn = HydraConfig.get().launcher["_target_"] == _BASIC_LAUNCHER
         began = time.time()
         try:
-            figure = self._do(job, show_bar=in_turn and sys.stderr.isatty())
+            with heeding():
+                figure = self._do(job, show_bar=in_turn and sys.stderr.isatty())
         except ExneatError as error:
             self._tell_failure(job, str(error))
         except Exception as error:

@@ -15,6 +15,7 @@ import yaml
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Team
+from exneat_cli.interruption import heeding
 from exneat_cli.records import (
     DONE,
     FAILED,
@@ -102,7 +103,8 @@ def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress
         directory.forget_what_was_derived()
     directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
     try:
-        result = _do(settings, directory, progress)
+        with heeding():
+            result = _do(settings, directory, progress)
     except KeyboardInterrupt:
         with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure
             directory.update_manifest(status=INTERRUPTED)
