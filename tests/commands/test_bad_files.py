@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+import yaml
 
 from exneat_cli.main import main
 from tests.commands.refusals import TASK, check_refusal
@@ -180,3 +181,17 @@ def test_files_from_other_systems_and_places_with_spaces_or_links_are_taken(
     (tmp_path / "my_experiment.yaml").write_bytes(spell(EXPERIMENT.encode()))  # type: ignore[operator]
     assert main(["sweep", "experiment=my_experiment.yaml", "budget=smoke", "output=out puts"]) == 0
     assert len(list((tmp_path / "real").glob("my_experiment-*/*"))) == 1
+
+
+def test_what_a_task_file_sets_counts_more_than_the_default_and_less_than_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine" / "task").mkdir(parents=True)
+    (tmp_path / "mine" / "task" / "own.yaml").write_bytes(TASK + b"name: my_mazes\nseed: 3\ntest_episodes: 3\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("exneat_cli.commands.train.draw_what_is_missing", lambda *arguments, **options: None)
+    own = ["--config-dir", "mine", "task=own", "algorithm=motionless", "budget=smoke", "output=out", "seed=5"]
+    assert main(["train", *own]) == 0
+    (run,) = (tmp_path / "out" / "my_mazes").iterdir()
+    written = yaml.safe_load((run / "config.yaml").read_text())
+    assert (written["seed"], written["test_episodes"]) == (5, 3)
