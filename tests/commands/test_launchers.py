@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -11,8 +13,33 @@ import pytest
 PROGRAM = Path(sys.executable).parent / "exneat"
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False)
+SLURM = {
+    "sbatch": r"""
+        tasks=$(sed -n 's/^#SBATCH --array=0-\([0-9]*\).*/\1/p' "$1")
+        for task in $(seq 0 "$tasks"); do
+            SLURM_JOB_ID=7$task SLURM_ARRAY_JOB_ID=7 SLURM_ARRAY_TASK_ID=$task SLURM_NTASKS=1 SLURM_JOB_NUM_NODES=1 \
+            SLURM_JOB_NODELIST=here SLURM_NODEID=0 SLURM_PROCID=0 SLURM_LOCALID=0 bash "$1" >/dev/null 2>&1 &
+        done
+        cp "$1" "$(dirname "$0")/submitted"
+        echo "Submitted batch job 7"
+    """,
+    "srun": """
+        while [ "${1#--}" != "$1" ]; do
+            case "$1" in --output|--error) shift 2 ;; *) shift ;; esac
+        done
+        exec "$@"
+    """,
+    "sacct": """
+        printf 'JobID|State|NodeList\\n7_0|RUNNING|here\\n7_1|RUNNING|here\\n'
+    """,
+}
+"""Stand-ins for Slurm's commands: they run the batch script on this machine, as many times as its array asks for."""
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [PROGRAM, *arguments], capture_output=True, text=True, check=False, env={**os.environ, **environment}
+    )
 
 
 def test_submitit_trains_the_same_and_says_why_a_job_failed(tmp_path: Path) -> None:
@@ -26,3 +53,24 @@ def test_submitit_trains_the_same_and_says_why_a_job_failed(tmp_path: Path) -> N
     assert list((tmp_path / "jobs" / ".submitit").rglob("*_log.out"))
     (here,), (there,) = ((tmp_path / place).glob("*/*/champion.json") for place in ("here", "there"))
     assert here.read_bytes() == there.read_bytes()
+
+
+def test_slurm_is_asked_for_what_was_set_and_its_jobs_train_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("hydra_plugins.hydra_submitit_launcher")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, script in SLURM.items():
+        (commands / name).write_text(f"#!/bin/bash\n{textwrap.dedent(script)}")
+        (commands / name).chmod(0o755)
+    common = ["train", "-m", "task=track_maze", "budget=smoke", "executor=serial", "seed=0,1"]
+    assert run(*common, f"output={tmp_path / 'here'}").returncode == 0
+    slurm = ["hydra/launcher=submitit_slurm", "hydra.launcher.partition=long", "hydra.launcher.timeout_min=240"]
+    place = [f"hydra.sweep.dir={tmp_path / 'jobs'}", f"output={tmp_path / 'there'}"]
+    done = run(*common, *slurm, *place, PATH=f"{commands}:{os.environ['PATH']}")
+    assert (done.returncode, done.stderr) == (0, "")
+    submitted = (commands / "submitted").read_text()
+    assert "#SBATCH --partition=long" in submitted
+    assert "#SBATCH --time=240" in submitted
+    here, there = (sorted((tmp_path / place).glob("*/*/champion.json")) for place in ("here", "there"))
+    assert [path.read_bytes() for path in here] == [path.read_bytes() for path in there]
+    assert len(there) == 2
