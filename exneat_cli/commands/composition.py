@@ -70,6 +70,32 @@ def run_composed(
         ExneatError: the configuration cannot be composed, or `job` raised it.
     """
     raised: list[BaseException] = []
+    os.environ["HYDRA_FULL_ERROR"] = "1"
+    flags, overrides = _flags_first(program, arguments)
+    directory = str(configuration_directory())
+    check_overrides(overrides, configuration_directory())
+    try:
+        # Jobs that are done one after the other share a cluster: starting one takes seconds.
+        with scratch_directory() as scratch, keep_clusters():
+            flags = [without_marks(flag, scratch) for flag in flags]
+            sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
+            elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
+            with unheard_by_children() if elsewhere else contextlib.nullcontext():
+                hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(_guarded(job, raised))()
+    except SystemExit as stop:
+        if stop.code:
+            raise ExneatError(f"{program}: the flags make no sense to Hydra, see {program} --hydra-help") from stop
+        raise
+    except Exception as error:
+        if error in raised:
+            raise
+        raise ExneatError(in_our_words(error, configuration_directory())) from error
+    if raised:
+        raise raised[0]
+
+
+def _guarded(job: Callable[[DictConfig], None], raised: list[BaseException]) -> Callable[[DictConfig], None]:
+    """The job, which notes in `raised` what it raises."""
     asked_by = os.getpid()
 
     def guarded(config: DictConfig) -> None:
@@ -84,28 +110,7 @@ def run_composed(
                 return  # raised below: Hydra would print lines of its own about it
             raise
 
-    os.environ["HYDRA_FULL_ERROR"] = "1"
-    flags, overrides = _flags_first(program, arguments)
-    directory = str(configuration_directory())
-    check_overrides(overrides, configuration_directory())
-    try:
-        # Jobs that are done one after the other share a cluster: starting one takes seconds.
-        with scratch_directory() as scratch, keep_clusters():
-            flags = [without_marks(flag, scratch) for flag in flags]
-            sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
-            elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
-            with unheard_by_children() if elsewhere else contextlib.nullcontext():
-                hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
-    except SystemExit as stop:
-        if stop.code:
-            raise ExneatError(f"{program}: the flags make no sense to Hydra, see {program} --hydra-help") from stop
-        raise
-    except Exception as error:
-        if error in raised:
-            raise
-        raise ExneatError(in_our_words(error, configuration_directory())) from error
-    if raised:
-        raise raised[0]
+    return guarded
 
 
 def settings_from(config: DictConfig) -> RunSettings:
