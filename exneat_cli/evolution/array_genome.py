@@ -68,6 +68,8 @@ class ArrayGenomeConfig(DefaultGenomeConfig):  # type: ignore[misc]
 
     positive_start = False
     """Whether initial weights are positive."""
+    chance: Any = random
+    """What the generator's seed is drawn from: Python's global generator, or a `random.Random`."""
 
     def __init__(self, params: dict[str, object], section_name: str) -> None:
         super().__init__(params, section_name)
@@ -79,9 +81,9 @@ class ArrayGenomeConfig(DefaultGenomeConfig):  # type: ignore[misc]
 
     @property
     def generator(self) -> Generator:
-        """Seeded by Python's global random state when it is first asked for, so one seed rules both."""
+        """Seeded by `chance` when it is first asked for, so one seed rules both."""
         if self._generator is None:
-            self._generator = Generator(PCG64(random.getrandbits(128)))
+            self._generator = Generator(PCG64(self.chance.getrandbits(128)))
         return self._generator
 
     @property

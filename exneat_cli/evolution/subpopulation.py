@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import neat
@@ -14,26 +12,24 @@ from neat.reporting import ReporterSet
 from neat.species import Species
 from numpy.random import SeedSequence
 
-from exneat_cli.evolution.array_genome import ArrayGenome
+from exneat_cli.evolution.array_genome import ArrayGenome, ArrayGenomeConfig
 from exneat_cli.evolution.conversion import from_stock
 from exneat_cli.evolution.counter import Counter
+from exneat_cli.evolution.lent_chance import lent_to_neat
 from exneat_cli.evolution.soundness import check_genome
 
 _LARGEST_ID = 2**62
-_GLOBAL_RANDOM_STATE = threading.Lock()
-"""Held while a subpopulation lends its state, so that two trainings in one process keep apart."""
 
 
 class Subpopulation:
     """What `neat.Population` is, turned inside out: the caller evaluates, this class only evolves.
 
-    neat-python draws from Python's global random state. Each subpopulation keeps a state of its own and
-    lends it to neat-python only while it works, so subpopulations do not disturb one another, and the
-    caller's random numbers stay as they were.
+    neat-python draws from Python's global generator. Each subpopulation has a generator of its own and
+    lends it to neat-python while it works, so neither subpopulations nor threads disturb one another.
 
     Args:
         config: for this subpopulation alone; two of them must not share one.
-        seed: of its random state.
+        seed: of its random numbers.
 
     Attributes:
         genomes: the current generation by id, in neat-python's order; of the configuration's class.
@@ -41,14 +37,17 @@ class Subpopulation:
 
     def __init__(self, config: neat.Config, seed: SeedSequence) -> None:
         self._equip(config)
-        self._random_state = random.Random(int.from_bytes(seed.generate_state(8).tobytes(), "little")).getstate()
+        self._chance.seed(int.from_bytes(seed.generate_state(8).tobytes(), "little"))
         self._generation = 0
-        with self._own_random_state():
+        with lent_to_neat(self._chance):
             self.genomes: dict[int, Any] = self._create()
             self._species.speciate(config, self.genomes, self._generation)
 
     def _equip(self, config: neat.Config) -> None:
         self.config = config
+        self._chance = random.Random()
+        if isinstance(config.genome_config, ArrayGenomeConfig):
+            config.genome_config.chance = self._chance
         reporters = ReporterSet()
         stagnation = config.stagnation_type(config.stagnation_config, reporters)
         self._reproduction = config.reproduction_type(config.reproduction_config, reporters, stagnation)
@@ -74,7 +73,7 @@ class Subpopulation:
         """
         for key, genome in self.genomes.items():
             genome.fitness = fitness[key]
-        with self._own_random_state():
+        with lent_to_neat(self._chance):
             self.genomes = self._reproduction.reproduce(
                 self.config, self._species, self.config.pop_size, self._generation
             )
@@ -89,7 +88,7 @@ class Subpopulation:
 
     def state(self) -> dict[str, Any]:
         """All but the genomes, as numbers, strings, lists and dicts; changes nothing."""
-        version, words, next_gauss = self._random_state
+        version, words, next_gauss = self._chance.getstate()
         return {
             "generation": self._generation,
             "random": [version, list(words), next_gauss],
@@ -130,9 +129,8 @@ class Subpopulation:
         subpopulation.genomes = {genome.key: genome for genome in genomes}
         subpopulation._generation = int(state["generation"])
         version, words, next_gauss = state["random"]
-        chance = random.Random()
-        chance.setstate((int(version), tuple(words), None if next_gauss is None else float(next_gauss)))
-        subpopulation._random_state = chance.getstate()
+        gauss = None if next_gauss is None else float(next_gauss)
+        subpopulation._chance.setstate((int(version), tuple(words), gauss))
         genome_config = config.genome_config
         genome_config.innovation_tracker = subpopulation._reproduction.innovation_tracker
         genome_config.innovation_tracker.global_counter = int(state["last_innovation"])
@@ -192,14 +190,3 @@ class Subpopulation:
             self.config.genome_type, self.config.genome_config, self.config.pop_size
         )
         return genomes
-
-    @contextmanager
-    def _own_random_state(self) -> Iterator[None]:
-        with _GLOBAL_RANDOM_STATE:
-            callers = random.getstate()
-            random.setstate(self._random_state)
-            try:
-                yield
-            finally:
-                self._random_state = random.getstate()
-                random.setstate(callers)
