@@ -15,6 +15,7 @@ import neat.reproduction
 
 _DRAWING = (neat.attributes, neat.genes, neat.genome, neat.reproduction)
 """The modules of neat-python 2.0 that draw."""
+_GLOBAL = random.random.__self__  # type: ignore[attr-defined]
 _LENT = threading.Lock()
 
 
@@ -43,4 +44,4 @@ def drawing_names() -> list[tuple[ModuleType, str]]:
 
 def draws(value: object) -> bool:
     """Whether this is the module `random`, or a function that draws from its global generator."""
-    return value is random or getattr(value, "__self__", None) is random.random.__self__  # type: ignore[attr-defined]
+    return value is random or getattr(value, "__self__", None) is _GLOBAL
