@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import errno
 import importlib
+import os
 import signal
 import sys
 from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import GOES_ON, heeding, listen, stop_listening
+from exneat_cli.interruption import heeding, listen, listening, stop_listening, tell_how_to_go_on
 
 COMMANDS = {
     "train": "train one arm with one seed; -m trains every combination",
@@ -62,8 +63,10 @@ def _printable(message: str) -> str:
 
 def program() -> int:
     """What the installed program calls: `main`, after which a late signal changes nothing."""
-    code = main()
+    listen()
+    code = _answer(sys.argv[1:])
     stop_listening()
+    _drop_what_nobody_reads()
     return code
 
 
@@ -75,14 +78,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: without the program's name; None takes the process's own.
     """
-    command, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    with listening():
+        return _answer(sys.argv[1:] if arguments is None else arguments)
+
+
+def _answer(arguments: Sequence[str]) -> int:
+    command, *rest = list(arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())), end="")
         return 0
     if command in ("-V", "--version"):
         print(f"exneat {__version__}")
         return 0
-    listen()
     try:
         if command not in COMMANDS:
             raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
@@ -96,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"exneat: {_printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        print(GOES_ON, file=sys.stderr)
+        tell_how_to_go_on()
         return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0
@@ -106,3 +113,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = error.filename or "temporary files or the program's own output"
         print(f"exneat: {where}: {error.strerror}; check the disk, output= and TMPDIR", file=sys.stderr)
         return 2
+
+
+def _drop_what_nobody_reads() -> None:
+    """Python would complain at its end, with another exit code, of output that a closed pipe does not take."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

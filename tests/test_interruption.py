@@ -11,17 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from exneat_cli.interruption import Interrupted, finishing, heeding, listen
+from exneat_cli.interruption import Interrupted, finishing, heeding, listening
 
 
-@pytest.fixture
-def listening() -> Iterator[None]:
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    listen()
-    yield
-    listen()
-    for number, handler in before.items():
-        signal.signal(number, handler)
+@pytest.fixture(name="listening")
+def _listening() -> Iterator[None]:
+    with listening():
+        yield
 
 
 @pytest.mark.usefixtures("listening")
@@ -58,11 +54,19 @@ def in_process(code: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def is_running(process: int) -> bool:
+    try:
+        return ") Z " not in Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+
+
 def test_a_second_signal_ends_the_process_at_once_even_in_the_midst_of_a_write() -> None:
     done = in_process("""
         with finishing():
             os.kill(os.getpid(), signal.SIGINT)
             print("still writing", flush=True)
+            time.sleep(0.3)
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(60)
             print("never", flush=True)
@@ -83,7 +87,7 @@ def test_a_process_that_swallows_the_signal_is_ended_with_its_children(tmp_path:
             time.sleep(600)
     """)
     assert done.returncode == 143
-    assert not Path(f"/proc/{note.read_text()}").exists() or "Z" in Path(f"/proc/{note.read_text()}/stat").read_text()
+    assert not is_running(int(note.read_text()))
 
 
 DROPPED = """
@@ -101,6 +105,16 @@ try:
     time.sleep(60)
 except interruption.Interrupted as interrupted:
     print("heard", interrupted.number == signal.SIGTERM)
+"""
+
+DROPPED_IN = """
+import weakref
+class Thing:
+    pass
+thing = Thing()
+watched = weakref.ref(thing, lambda _: [os.kill(os.getpid(), signal.SIGINT), time.sleep(1)])
+del thing
+time.sleep(60)
 """
 
 SWALLOWED = """
@@ -182,7 +196,7 @@ with interruption.scratch_directory() as scratch:
 
 
 @pytest.mark.parametrize(
-    ("patience", "moments"), [pytest.param(0.2, [0.1], id="one"), pytest.param(600.0, [0.1, 0.2], id="two")]
+    ("patience", "moments"), [pytest.param(0.2, [0.1], id="one"), pytest.param(600.0, [0.1, 0.4], id="two")]
 )
 def test_a_main_thread_in_compiled_code_is_ended_and_its_temporary_files_deleted(
     patience: float, moments: list[float]
@@ -240,3 +254,73 @@ def test_an_error_that_a_library_made_of_the_interruption_is_the_interruption_ag
 def test_an_error_without_a_signal_stays_what_it_is() -> None:
     with pytest.raises(ValueError, match="its own"), heeding():
         raise ValueError("its own")
+
+
+def test_an_echo_of_the_signal_is_no_second_one() -> None:
+    done = in_process("""
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+        except KeyboardInterrupt:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.5)
+            print("tidied up", flush=True)
+    """)
+    assert (done.stdout, done.returncode) == ("tidied up\n", 0)
+
+
+def test_a_second_signal_ends_children_too_though_the_main_thread_ends_by_itself(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+    done = in_process(f"""
+        child = subprocess.Popen(["sleep", "600"])
+        open({str(note)!r}, "w").write(str(child.pid))
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+        finally:
+            time.sleep(0.3)
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+    """)
+    assert done.returncode == 143
+    assert not is_running(int(note.read_text()))
+
+
+def test_ctrl_c_is_heard_also_after_an_exception_was_dropped_amid_children_that_must_not_hear_it() -> None:
+    done = in_process(f"""
+        from exneat_cli.interruption import unheard_by_children
+        try:
+            with unheard_by_children():
+                exec({DROPPED_IN!r})
+        except KeyboardInterrupt:
+            print("heard")
+    """)
+    assert (done.stdout, done.stderr) == ("heard\n", "")
+
+
+@pytest.mark.parametrize("block", ["listening", "nothing"])
+def test_after_the_block_signals_and_errors_are_as_before(block: str) -> None:
+    done = in_process(f"""
+        from exneat_cli import interruption
+        interruption._Heard.watch.call_off()
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        interruption.PATIENCE = 0.1
+        sys.unraisablehook = hook = lambda lost: None
+        if {block!r} == "listening":
+            try:
+                with interruption.listening():
+                    os.kill(os.getpid(), signal.SIGTERM)
+                    time.sleep(60)
+            except KeyboardInterrupt:
+                pass
+        print(signal.getsignal(signal.SIGINT) is signal.default_int_handler, sys.unraisablehook is hook)
+        print(signal.getsignal(signal.SIGTERM) == signal.SIG_DFL, signal.set_wakeup_fd(-1))
+        try:
+            with interruption.heeding():
+                raise ValueError
+        except ValueError:
+            time.sleep(0.3)
+    """)
+    assert (done.stdout, done.returncode) == ("True True\nTrue -1\n", 0)

@@ -80,7 +80,7 @@ def run_composed(
             flags = [without_marks(flag, scratch) for flag in flags]
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
             elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
-            with unheard_by_children() if elsewhere else contextlib.nullcontext():
+            with heeding(), unheard_by_children() if elsewhere else contextlib.nullcontext():
                 hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(_guarded(job, raised))()
     except SystemExit as stop:
         if stop.code:

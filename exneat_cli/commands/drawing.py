@@ -11,13 +11,18 @@ from exneat_cli.records import RunDirectory
 def missing_figures(directory: RunDirectory, *, swept: bool) -> list[str]:
     """Names of the figures that a finished run has data for, but no picture, or one older than its data."""
     data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
-    if swept:
-        data["robustness"] = directory.robustness
-    return [name for name, source in data.items() if _is_missing(directory.plots / f"{name}.svg", source)]
+    missing = [name for name, path in data.items() if path.exists() and not _picture(directory, name).exists()]
+    return [*missing, "robustness"] if swept and _is_robustness_missing(directory) else missing
 
 
-def _is_missing(picture: Path, data: Path) -> bool:
+def _is_robustness_missing(directory: RunDirectory) -> bool:
+    """Its data may grow later on; those of the other figures come and go together with these."""
+    picture, data = _picture(directory, "robustness"), directory.robustness
     return data.exists() and not (picture.exists() and picture.stat().st_mtime >= data.stat().st_mtime)
+
+
+def _picture(directory: RunDirectory, name: str) -> Path:
+    return directory.plots / f"{name}.svg"
 
 
 def draw_what_is_missing(directory: RunDirectory, fitness_name: str, labels: Mapping[str, str]) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from configparser import ConfigParser
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import neat
@@ -16,6 +14,7 @@ from exneat_cli.evolution.genes import ACTIVATIONS
 from exneat_cli.evolution.initial_connections import INITIAL_CONNECTIONS
 from exneat_cli.evolution.reproduction import SteadyReproduction
 from exneat_cli.evolution.stock_genome import HomologousGenome
+from exneat_cli.interruption import scratch_directory
 
 GENOMES = {"array": ArrayGenome, "stock": HomologousGenome}
 
@@ -228,8 +227,8 @@ def _read_config(sections: dict[str, dict[str, object]], genome_type: type[Any])
     parser = ConfigParser()
     parser.read_dict(sections)
     try:
-        with tempfile.TemporaryDirectory() as directory:
-            path = Path(directory) / "neat.ini"
+        with scratch_directory() as directory:
+            path = directory / "neat.ini"
             with path.open("w", encoding="utf-8") as file:
                 parser.write(file)
             kinds = (SteadyReproduction, neat.DefaultSpeciesSet, neat.DefaultStagnation)

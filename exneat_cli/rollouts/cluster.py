@@ -132,7 +132,11 @@ class Cluster:
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            scheduler_kwargs={
+                "dashboard": False,
+                "dashboard_address": "127.0.0.1:0",
+                "local_directory": str(scratch),
+            },
             memory_limit=0,
             local_directory=str(scratch),
             silence_logs=logging.CRITICAL,
