@@ -1,0 +1,19 @@
+"""Ctrl-C and SIGTERM: a write in hand is finished first, then everything ends within seconds."""
+
+from exneat_cli.interruption.children import unheard_by_children
+from exneat_cli.interruption.handlers import heeding, listen, listening, stop_listening, tell_how_to_go_on
+from exneat_cli.interruption.scratch import scratch_directory
+from exneat_cli.interruption.signals import Interrupted
+from exneat_cli.interruption.writes import finishing
+
+__all__ = [
+    "Interrupted",
+    "finishing",
+    "heeding",
+    "listen",
+    "listening",
+    "scratch_directory",
+    "stop_listening",
+    "tell_how_to_go_on",
+    "unheard_by_children",
+]

@@ -1,0 +1,40 @@
+"""Temporary files that are deleted however the process ends, short of kill -9."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from exneat_cli.interruption.writes import finishing
+
+_there: set[Path] = set()
+
+
+@contextlib.contextmanager
+def scratch_directory(prefix: str = "exneat-", above: Path | None = None) -> Iterator[Path]:
+    """A new directory for temporary files; it is deleted with the block, also where the process is ended amid it.
+
+    Args:
+        prefix: of its name.
+        above: the directory that it is made in; the system's for temporary files without it.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    path = Path(tempfile.mkdtemp(prefix=prefix, dir=above))
+    _there.add(path)
+    try:
+        yield path
+    finally:
+        with finishing():
+            shutil.rmtree(path, ignore_errors=True)
+            _there.discard(path)
+
+
+def delete_scratch() -> None:
+    """Delete all such directories now."""
+    for path in tuple(_there):
+        shutil.rmtree(path, ignore_errors=True)

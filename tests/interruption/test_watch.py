@@ -1,0 +1,108 @@
+"""A process that does not end by itself is ended, with all that it started."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.interruption.processes import in_process, is_running
+
+
+def test_a_process_that_swallows_the_signal_is_ended_with_its_children(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+    done = in_process(f"""
+        child = subprocess.Popen(["sleep", "600"])
+        open({str(note)!r}, "w").write(str(child.pid))
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(600)
+        except KeyboardInterrupt:
+            time.sleep(600)
+    """)
+    assert done.returncode == 143
+    assert not is_running(int(note.read_text()))
+
+
+SWALLOWED = """
+import os, signal, time
+from exneat_cli import interruption
+from exneat_cli.interruption import watch
+
+watch.PATIENCE = 0.2
+interruption.listen()
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+except BaseException:
+    pass
+time.sleep(60)
+"""
+
+
+def test_a_process_that_swallows_the_exception_is_ended_with_the_line_that_says_how_to_go_on() -> None:
+    done = in_process(SWALLOWED)
+    assert done.returncode == 130
+    assert done.stderr.startswith("exneat: interrupted; the same command goes on")
+
+
+def test_a_second_signal_ends_children_too_though_the_main_thread_ends_by_itself(tmp_path: Path) -> None:
+    note = tmp_path / "child"
+    done = in_process(f"""
+        child = subprocess.Popen(["sleep", "600"])
+        open({str(note)!r}, "w").write(str(child.pid))
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+        finally:
+            time.sleep(0.3)
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(60)
+    """)
+    assert done.returncode == 143
+    assert not is_running(int(note.read_text()))
+
+
+IN_COMPILED_CODE = """
+import hashlib, os, signal, threading
+from exneat_cli import interruption
+from exneat_cli.interruption import watch
+
+watch.PATIENCE = {patience}
+interruption.listen()
+with interruption.scratch_directory() as scratch:
+    (scratch / "file").write_text("temporary")
+    print(scratch, flush=True)
+    for seconds in {moments}:
+        threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+"""The main thread is in code that neither looks for signals nor ends within minutes."""
+
+
+@pytest.mark.parametrize(
+    ("patience", "moments"), [pytest.param(0.2, [0.1], id="one"), pytest.param(600.0, [0.1, 0.4], id="two")]
+)
+def test_a_main_thread_in_compiled_code_is_ended_and_its_temporary_files_deleted(
+    patience: float, moments: list[float]
+) -> None:
+    done = in_process(IN_COMPILED_CODE.format(patience=patience, moments=moments))
+    assert done.returncode == 143
+    assert not Path(done.stdout.strip()).exists()
+    assert ("goes on" in done.stderr) == (len(moments) == 1)
+
+
+def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
+    done = in_process("""
+        from exneat_cli import interruption
+        from exneat_cli.interruption import handlers, watch
+        watch.PATIENCE = 0.1
+        for _ in range(3):
+            try:
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(60)
+            except KeyboardInterrupt:
+                listen()
+        time.sleep(0.3)
+    """)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,91 @@
+"""Writes in hand are finished before anything ends."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.interruption import Interrupted, finishing, listening
+from tests.interruption.processes import in_process
+
+
+@pytest.fixture(name="listening")
+def _listening() -> Iterator[None]:
+    with listening():
+        yield
+
+
+@pytest.mark.usefixtures("listening")
+def test_a_write_in_hand_is_finished_first() -> None:
+    done = []
+
+    def write() -> None:
+        with finishing():
+            with finishing():
+                signal.raise_signal(signal.SIGTERM)
+                done.append("inner")
+            done.append("outer")
+        done.append("never")
+
+    with pytest.raises(Interrupted):
+        write()
+    assert done == ["inner", "outer"]
+
+
+def test_a_process_is_not_ended_amid_a_write() -> None:
+    done = in_process("""
+        from exneat_cli import interruption
+        from exneat_cli.interruption import handlers, watch
+        watch.PATIENCE, watch.GRACE = 0.1, 60.0
+        try:
+            with finishing():
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(0.4)
+                print("written", flush=True)
+        except KeyboardInterrupt:
+            time.sleep(60)
+    """)
+    assert (done.stdout, done.returncode) == ("written\n", 143)
+
+
+WRITING = """
+import pathlib, sys, time
+from exneat_cli.interruption import finishing
+with finishing():
+    print("begun", flush=True)
+    time.sleep(0.3)
+    pathlib.Path(sys.argv[1]).touch()
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_children_finish_their_writes_before_anybody_may_kill_them(tmp_path: Path, number: int) -> None:
+    done = in_process(f"""
+        from pathlib import Path
+        from exneat_cli.interruption import unheard_by_children, writes
+        writes.GRACE = 30.0
+        written = Path({str(tmp_path / "written")!r})
+        try:
+            with unheard_by_children():
+                child = subprocess.Popen([sys.executable, "-c", {WRITING!r}, str(written)], stdout=subprocess.PIPE)
+                child.stdout.readline()
+                os.kill(os.getpid(), {int(number)})
+                time.sleep(60)
+        except KeyboardInterrupt:
+            print(written.exists())
+            child.kill()
+    """)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_a_child_writes_though_whoever_started_it_is_gone(tmp_path: Path) -> None:
+    done = in_process(f"""
+        os.environ["EXNEAT_WRITES"] = {str(tmp_path / "gone" / "writes")!r}
+        with finishing():
+            print("written")
+    """)
+    assert done.stdout == "written\n"
