@@ -142,7 +142,9 @@ def _judge(
 ) -> _Stop:
     """What the process did, with complaints about what it should not have done."""
     left = len(program.left_over())
-    files = sum(1 for _ in program.temporary.iterdir())
+    files = sum(1 for _ in program.temporary.iterdir()) + sum(
+        1 for _ in (program.temporary.parent / "out").rglob("*.tmp")
+    )
     errors = program.errors.strip()
     if code == 0:
         return _Stop(0.0 if not running else seconds, left, files, "done before")
