@@ -13,6 +13,8 @@ import neat.genes
 import neat.genome
 import neat.reproduction
 
+from exneat_cli.interruption import uninterrupted
+
 _DRAWING = (neat.attributes, neat.genes, neat.genome, neat.reproduction)
 """The modules of neat-python 2.0 that draw."""
 _GLOBAL = random.random.__self__  # type: ignore[attr-defined]
@@ -26,7 +28,7 @@ def lent_to_neat(chance: random.Random) -> Iterator[None]:
     That one belongs to every thread: dask's draw from it whenever they like, also while genomes reproduce.
     One training at a time is let in.
     """
-    with _LENT:
+    with uninterrupted(), _LENT:
         before = [(module, name, getattr(module, name)) for module, name in drawing_names()]
         try:
             for module, name, drawn in before:

@@ -2,12 +2,14 @@
 
 from exneat_cli.interruption.children import unheard_by_children
 from exneat_cli.interruption.handlers import heeding, listen, listening, stop_listening, tell_how_to_go_on
+from exneat_cli.interruption.last_acts import before_the_end
 from exneat_cli.interruption.scratch import scratch_directory
 from exneat_cli.interruption.signals import Interrupted
-from exneat_cli.interruption.writes import finishing
+from exneat_cli.interruption.writes import finishing, uninterrupted
 
 __all__ = [
     "Interrupted",
+    "before_the_end",
     "finishing",
     "heeding",
     "listen",
@@ -16,4 +18,5 @@ __all__ = [
     "stop_listening",
     "tell_how_to_go_on",
     "unheard_by_children",
+    "uninterrupted",
 ]

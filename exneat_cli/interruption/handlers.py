@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 
 from exneat_cli.interruption.signals import Heard, Interrupted
 from exneat_cli.interruption.watch import HEARD, Watch
-from exneat_cli.interruption.writes import Writes, interrupt
+from exneat_cli.interruption.writes import interrupt
 
 GOES_ON = "exneat: interrupted; the same command goes on (a single exneat train with resume=true)"
 """The last line of whoever was interrupted."""
@@ -99,7 +99,7 @@ def heeding() -> Iterator[None]:
 def _hear(number: int, _: object) -> None:
     if Heard.anything():
         return  # the watch sees to it, while what the first one began goes on
-    if Writes.depth:
+    if Heard.put_off:
         Heard.waiting = number
     else:
         interrupt(number)

@@ -22,11 +22,13 @@ class Heard:
 
     Attributes:
         raised: number of the signal that `Interrupted` was raised for; None before.
-        waiting: number of the one that waits for the end of a write.
+        put_off: how many blocks the main thread is in that must not be interrupted.
+        waiting: number of the one that waits for their end.
         through_others: whether the main thread blocks Ctrl-C, so that another thread hears it.
     """
 
     raised: int | None = None
+    put_off = 0
     waiting: int | None = None
     through_others = False
 

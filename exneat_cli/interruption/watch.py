@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 
 from exneat_cli.interruption.children import kill_descendants
+from exneat_cli.interruption.last_acts import do_last_acts
 from exneat_cli.interruption.scratch import delete_scratch
 from exneat_cli.interruption.signals import Heard
 from exneat_cli.interruption.writes import GRACE, Writes
@@ -83,11 +84,12 @@ class Watch:
         return 0
 
     def _next_during_write(self) -> int:
-        """The same until a write in hand is done; the main thread is kept from the next one."""
+        """The same until a write in hand is done; the main thread is kept from the next one, and last acts are done."""
         until = time.monotonic() + GRACE
         second = 0
         while not (self._called_off or second) and time.monotonic() < until:
             if Writes.lock.acquire(timeout=_PAUSE):
+                do_last_acts()
                 break
             second = self._next(_PAUSE)
         return second

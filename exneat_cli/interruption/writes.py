@@ -23,19 +23,21 @@ class Writes:
     """The writes of this process that are in hand.
 
     Attributes:
-        depth: how many blocks of `finishing` the main thread is in.
-        lock: held while it is in one.
+        lock: held while the main thread is in a block of `finishing`.
+        in_hand: whether it is.
         of_children: descriptor of the file that children lock; None if there is none.
     """
 
-    depth = 0
     lock = threading.Lock()
+    in_hand = False
     of_children: int | None = None
 
 
 @contextlib.contextmanager
-def finishing() -> Iterator[None]:
-    """Put `Interrupted` off until the block is done, if this is the main thread.
+def uninterrupted() -> Iterator[None]:
+    """Put `Interrupted` off until the block is done, if this is the main thread; the process may be ended amid it.
+
+    For calls of compiled code with NumPy's generators: numba 0.68 crashes where a signal raises while it reads one.
 
     Raises:
         Interrupted: at the end of the block, if a signal came meanwhile.
@@ -43,19 +45,33 @@ def finishing() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    Writes.depth += 1
-    outermost = Writes.depth == 1
+    Heard.put_off += 1
     try:
-        if outermost:
-            with Writes.lock, _known_to_parent():
-                yield
-        else:
-            yield
+        yield
     finally:
-        Writes.depth -= 1
-        if Heard.waiting is not None and outermost:
+        Heard.put_off -= 1
+        if Heard.waiting is not None and Heard.put_off == 0:
             number, Heard.waiting = Heard.waiting, None
             interrupt(number)
+
+
+@contextlib.contextmanager
+def finishing() -> Iterator[None]:
+    """`uninterrupted` for a write: nor is the process ended amid it, if it takes no longer than `GRACE`.
+
+    Raises:
+        Interrupted: at the end of the block, if a signal came meanwhile.
+    """
+    with uninterrupted():
+        if Writes.in_hand or threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        with Writes.lock, _known_to_parent():
+            Writes.in_hand = True
+            try:
+                yield
+            finally:
+                Writes.in_hand = False
 
 
 def interrupt(number: int) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import memory_size
+from exneat_cli.interruption import uninterrupted
 from exneat_cli.rollouts.episode import Buffers, Conditions, episode_loop
 from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Results
@@ -84,21 +85,22 @@ class Player:
             trace: (steps + 1, columns) to record the path of the last one, see `Trace`.
         """
         located = len(self._task.trace_columns)
-        self._loop(
-            self._simulation.world,
-            crew.brains,
-            *chosen,
-            *(generator(seed) for seed in seeds),
-            crew.conditions,
-            buffers,
-            self._task.observation_size,
-            self._halt,
-            results.status,
-            results.steps,
-            results.totals,
-            np.zeros((0, located + len(self._task.terms))) if trace is None else trace,
-            located,
-        )
+        with uninterrupted():
+            self._loop(
+                self._simulation.world,
+                crew.brains,
+                *chosen,
+                *(generator(seed) for seed in seeds),
+                crew.conditions,
+                buffers,
+                self._task.observation_size,
+                self._halt,
+                results.status,
+                results.steps,
+                results.totals,
+                np.zeros((0, located + len(self._task.terms))) if trace is None else trace,
+                located,
+            )
 
     def tiles(self) -> NDArray[np.float64] | None:
         """The world as the last episode left it, see `Task.tiles`."""

@@ -15,7 +15,7 @@ import yaml
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.evolution import Team
-from exneat_cli.interruption import heeding
+from exneat_cli.interruption import before_the_end, heeding
 from exneat_cli.records import (
     DONE,
     FAILED,
@@ -103,7 +103,7 @@ def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress
         directory.forget_what_was_derived()
     directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
     try:
-        with heeding():
+        with heeding(), before_the_end(lambda: directory.update_manifest(status=INTERRUPTED)):
             result = _do(settings, directory, progress)
     except KeyboardInterrupt:
         with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure

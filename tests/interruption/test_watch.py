@@ -106,3 +106,25 @@ def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
         time.sleep(0.3)
     """)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+LAST_ACTS = """
+import hashlib, os, signal, sys, threading
+from exneat_cli.interruption import before_the_end, listen, watch
+
+def fail():
+    raise ValueError
+
+watch.PATIENCE = 0.2
+listen()
+with before_the_end(lambda: print("marked", flush=True)), before_the_end(fail):
+    with before_the_end(lambda: print("over", flush=True)):
+        pass
+    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+
+
+def test_what_is_to_be_done_before_the_end_is_done_where_the_main_thread_does_not_hear() -> None:
+    done = in_process(LAST_ACTS)
+    assert (done.stdout, done.returncode) == ("marked\n", 143)

@@ -89,3 +89,32 @@ def test_a_child_writes_though_whoever_started_it_is_gone(tmp_path: Path) -> Non
             print("written")
     """)
     assert done.stdout == "written\n"
+
+
+WITH_GENERATORS = """
+import random, signal
+from exneat_cli.evolution import EvolutionSettings
+from exneat_cli.evolution.settings import neat_config
+from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.interruption import Interrupted, handlers, listen
+from exneat_cli.seeding import stream
+
+settings = EvolutionSettings()
+subpopulation = Subpopulation(neat_config(settings, 20, (4, 3, 2)), stream(0, "evolution", 0))
+signal.signal(signal.SIGALRM, lambda *_: handlers._hear(signal.SIGALRM, None))
+chance, heard = random.Random(0), 0
+for generation in range(1500):
+    handlers.Heard.forget()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 1e-3))
+        subpopulation.advance(dict.fromkeys(subpopulation.genomes, 0.0))
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    except Interrupted:
+        heard += 1
+print(heard > 100)
+"""
+
+
+def test_signals_while_genomes_reproduce_crash_nothing() -> None:
+    done = in_process(WITH_GENERATORS)
+    assert (done.stdout, done.stderr, done.returncode) == ("True\n", "", 0)
