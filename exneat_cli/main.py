@@ -83,6 +83,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _answer(arguments: Sequence[str]) -> int:
+    try:
+        return _answer_unless_interrupted(arguments)
+    except KeyboardInterrupt as interrupt:
+        tell_how_to_go_on()
+        return 128 + getattr(interrupt, "number", signal.SIGINT)
+
+
+def _answer_unless_interrupted(arguments: Sequence[str]) -> int:
     command, *rest = list(arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())), end="")
@@ -102,9 +110,6 @@ def _answer(arguments: Sequence[str]) -> int:
     except ExneatError as error:
         print(f"exneat: {_printable(str(error))}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt as interrupt:
-        tell_how_to_go_on()
-        return 128 + getattr(interrupt, "number", signal.SIGINT)
     except BrokenPipeError:
         return 0
     except OSError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ from exneat_cli.commands.complaints import in_our_words
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.commands.own_files import check_own_files, without_marks
 from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.interruption import heeding, scratch_directory, unheard_by_children
+from exneat_cli.interruption import as_worker, heeding, scratch_directory, unheard_by_children
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
@@ -99,10 +98,8 @@ def _guarded(job: Callable[[DictConfig], None], raised: list[BaseException]) -> 
     asked_by = os.getpid()
 
     def guarded(config: DictConfig) -> None:
-        if os.getpid() != asked_by:  # a launcher's worker: whoever started it hears Ctrl-C, and ends it
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
-            with heeding():
+            with contextlib.nullcontext() if os.getpid() == asked_by else as_worker(), heeding():
                 job(config)
         except BaseException as error:
             raised.append(error)

@@ -26,7 +26,7 @@ def lent_to_neat(chance: random.Random) -> Iterator[None]:
     """While inside, neat-python draws from `chance` instead of Python's global generator.
 
     That one belongs to every thread: dask's draw from it whenever they like, also while genomes reproduce.
-    One training at a time is let in.
+    One training at a time is let in. Signals are put off, see `uninterrupted`.
     """
     with uninterrupted(), _LENT:
         before = [(module, name, getattr(module, name)) for module, name in drawing_names()]

@@ -1,43 +1,76 @@
-"""Processes that this one started."""
+"""Processes that this one started, and the jobs that they do."""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import signal
-import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from exneat_cli.interruption.scratch import scratch_directory
-from exneat_cli.interruption.signals import Heard
-from exneat_cli.interruption.writes import of_children_watched
+from exneat_cli.interruption.signals import Interrupted
+
+JOB_SECONDS = 2.0
+"""How long the jobs of children may take to end."""
+_PAUSE = 0.01
+_SHARED = "EXNEAT_JOBS"
+"""Environment variable that names the file which children lock while they do a job."""
+_OVER = b"over"
+
+
+class _Jobs:
+    """The file that children lock, opened by their parent; None if there is none."""
+
+    descriptor: int | None = None
 
 
 @contextlib.contextmanager
-def unheard_by_children() -> Iterator[None]:
-    """Processes that are started meanwhile do not hear Ctrl-C, which a terminal sends to all; this one still does.
+def jobs_watched(file: Path) -> Iterator[None]:
+    """Processes that are started meanwhile, and are `at_work`, lock `file`.
 
-    They would each end with a traceback, while whoever started them ends them anyway, after their writes in hand.
-    Children inherit what the main thread blocks, so another thread takes the signal, and the watch wakes the main one
-    by SIGURG, which nobody uses.
+    Args:
+        file: to be made.
     """
-    if threading.current_thread() is not threading.main_thread():
+    _Jobs.descriptor = os.open(file, os.O_RDWR | os.O_CREAT)
+    os.environ[_SHARED] = str(file)
+    try:
         yield
-        return
-    from multiprocessing import resource_tracker  # here, for it takes longer to import than --help to answer
+    finally:
+        del os.environ[_SHARED]
+        os.close(_Jobs.descriptor)
+        _Jobs.descriptor = None
 
-    resource_tracker.ensure_running()  # its first start would undo what comes
-    with scratch_directory() as scratch, of_children_watched(scratch / "writes"):
-        before = signal.signal(signal.SIGURG, lambda *_: None)
-        Heard.through_others = True
-        try:
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            yield
-        finally:
-            Heard.through_others = False
-            signal.signal(signal.SIGURG, before)
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+@contextlib.contextmanager
+def at_work() -> Iterator[None]:
+    """Have whoever started this process wait for the end of the block, if they asked for it and are still there.
+
+    Raises:
+        Interrupted: at once, if they were interrupted before.
+    """
+    with contextlib.ExitStack() as ending:
+        with contextlib.suppress(KeyError, FileNotFoundError):  # nobody asked, or on another machine, or long ago
+            descriptor = os.open(os.environ[_SHARED], os.O_RDWR)
+            ending.callback(os.close, descriptor)
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
+            if os.read(descriptor, len(_OVER)):
+                raise Interrupted(signal.SIGTERM)
+        yield
+
+
+def end_jobs_of_children() -> None:
+    """Interrupt the jobs of children, and wait until they have ended, `JOB_SECONDS` at most."""
+    if _Jobs.descriptor is None:
+        return
+    os.write(_Jobs.descriptor, _OVER)
+    for child in _children(os.getpid()):
+        with contextlib.suppress(OSError):
+            os.kill(child, signal.SIGTERM)
+    until = time.monotonic() + JOB_SECONDS
+    while time.monotonic() < until and not _locks(_Jobs.descriptor):
+        time.sleep(_PAUSE)
 
 
 def kill_descendants() -> None:
@@ -49,11 +82,25 @@ def kill_descendants() -> None:
                 os.kill(process, signal.SIGKILL)
 
 
+def _locks(descriptor: int) -> bool:
+    """Whether no child is at work."""
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
 def _descendants(process: int) -> list[int]:
+    found = []
+    for child in _children(process):
+        found += [*_descendants(child), child]
+    return found
+
+
+def _children(process: int) -> list[int]:
     found = []
     with contextlib.suppress(OSError):
         for path in list(Path(f"/proc/{process}/task").glob("*/children")):
             with contextlib.suppress(OSError):
-                for child in path.read_text(encoding="ascii").split():
-                    found += [*_descendants(int(child)), int(child)]
+                found += [int(child) for child in path.read_text(encoding="ascii").split()]
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import sys
 import threading
@@ -46,8 +47,10 @@ def listen() -> None:
 
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
-    """`listen` while inside; afterwards signals, and this module, are as before."""
+    """`listen` while inside; afterwards signals, and this module, are as before. From the main thread alone."""
     handlers = {number: signal.getsignal(number) for number in HEARD}
+    hook, watch, told = _Now.hook_before, _Now.watch, _Now.told
+    _Now.watch, shown = None, sys.unraisablehook
     descriptor = signal.set_wakeup_fd(-1)
     try:
         listen()
@@ -56,22 +59,22 @@ def listening() -> Iterator[None]:
         signal.set_wakeup_fd(descriptor)
         if _Now.watch is not None:
             _Now.watch.call_off()
-        _Now.watch = None
+        _Now.hook_before, _Now.watch, _Now.told = hook, watch, told
         Heard.forget()
-        sys.unraisablehook = _Now.hook_before
+        sys.unraisablehook = shown
         for number, handler in handlers.items():
             signal.signal(number, handler)
 
 
 def tell_how_to_go_on() -> None:
-    """Say, once, how to go on."""
+    """Say, once, how to go on; where nobody reads, nothing."""
     if _Now.told:
         return
     _Now.told = True
-    with contextlib.suppress(OSError, ValueError):  # nobody may be reading any more
+    with contextlib.suppress(OSError, ValueError):
         if threading.current_thread() is threading.main_thread():
             print(GOES_ON, file=sys.stderr, flush=True)
-        else:  # the main thread may be in the midst of printing
+        elif select.select([], [2], [], 0.0)[1]:  # the main thread may be in the midst of printing
             os.write(2, f"{GOES_ON}\n".encode())
 
 

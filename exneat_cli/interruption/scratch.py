@@ -1,4 +1,4 @@
-"""Temporary files that are deleted however the process ends, short of kill -9."""
+"""Temporary files that are deleted also where the process must be ended."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from exneat_cli.interruption.writes import finishing
+from exneat_cli.interruption.writes import finishing, uninterrupted
 
 _there: set[Path] = set()
 
 
 @contextlib.contextmanager
 def scratch_directory(prefix: str = "exneat-", above: Path | None = None) -> Iterator[Path]:
-    """A new directory for temporary files; it is deleted with the block, also where the process is ended amid it.
+    """A new directory for temporary files; it is deleted with the block, also where a watch ends the process amid it.
 
     Args:
         prefix: of its name.
@@ -24,8 +24,9 @@ def scratch_directory(prefix: str = "exneat-", above: Path | None = None) -> Ite
     Raises:
         OSError: it cannot be made.
     """
-    path = Path(tempfile.mkdtemp(prefix=prefix, dir=above))
-    _there.add(path)
+    with uninterrupted():
+        path = Path(tempfile.mkdtemp(prefix=prefix, dir=above))
+        _there.add(path)
     try:
         yield path
     finally:

@@ -16,6 +16,9 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(signal.Signals(number).name)
         self.number = number
 
+    def __reduce__(self) -> tuple[type[Interrupted], tuple[int]]:
+        return Interrupted, (self.number,)
+
 
 class Heard:
     """The signals of this process, of which there is one set; handlers run in the main thread alone.

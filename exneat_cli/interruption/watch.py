@@ -30,6 +30,7 @@ class Watch:
     """Hears signals in a thread of its own: the main thread hears none while it is in compiled code, or compiles.
 
     It ends the process, and what that started, `PATIENCE` seconds after the first signal or upon a second one.
+    A write in hand has `GRACE` more.
 
     Args:
         is_heard: whether the signal of this number is one to end upon, by now.
@@ -40,7 +41,7 @@ class Watch:
         self._is_heard, self._last_words = is_heard, last_words
         self._ear, self._mouth = socket.socketpair()
         self._mouth.setblocking(False)
-        self._called_off = False
+        self._called_off = self._kept_from_writing = False
         signal.set_wakeup_fd(self._mouth.fileno(), warn_on_full_buffer=False)
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -62,6 +63,8 @@ class Watch:
             if not second:
                 self._last_words()
             _end(second or first)
+        if self._kept_from_writing:
+            Writes.lock.release()
 
     def _next(self, seconds: float, not_before: float = 0.0) -> int:
         """Number of the next signal that counts; 0 if none came in time, or the watch was called off.
@@ -89,7 +92,9 @@ class Watch:
         second = 0
         while not (self._called_off or second) and time.monotonic() < until:
             if Writes.lock.acquire(timeout=_PAUSE):
-                do_last_acts()
+                self._kept_from_writing = True
+                if not self._called_off:
+                    do_last_acts()
                 break
             second = self._next(_PAUSE)
         return second

@@ -1,36 +1,28 @@
-"""Writes that are finished before anything ends, in this process and in those that it started."""
+"""What must not be interrupted, and writes that are finished before the process is ended."""
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
 import threading
-import time
 from collections.abc import Iterator
-from pathlib import Path
 
+from exneat_cli.interruption.children import end_jobs_of_children
 from exneat_cli.interruption.signals import Heard, Interrupted
 
 GRACE = 0.8
-"""Seconds that a write in hand has."""
-_PAUSE = 0.01
-_SHARED = "EXNEAT_WRITES"
-"""Environment variable that names the file which processes of ours lock while they write."""
+"""Seconds that a write in hand has, in a process that is being ended."""
 
 
 class Writes:
     """The writes of this process that are in hand.
 
     Attributes:
-        lock: held while the main thread is in a block of `finishing`.
-        in_hand: whether it is.
-        of_children: descriptor of the file that children lock; None if there is none.
+        lock: held while the main thread is in a block of `finishing`; a watch that ends the process takes it too.
+        in_hand: whether the main thread is in such a block.
     """
 
     lock = threading.Lock()
     in_hand = False
-    of_children: int | None = None
 
 
 @contextlib.contextmanager
@@ -57,7 +49,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def finishing() -> Iterator[None]:
-    """`uninterrupted` for a write: nor is the process ended amid it, if it takes no longer than `GRACE`.
+    """`uninterrupted` for a write: a first signal does not end the process amid it, unless it takes `GRACE` and more.
 
     Raises:
         Interrupted: at the end of the block, if a signal came meanwhile.
@@ -66,7 +58,7 @@ def finishing() -> Iterator[None]:
         if Writes.in_hand or threading.current_thread() is not threading.main_thread():
             yield
             return
-        with Writes.lock, _known_to_parent():
+        with Writes.lock:
             Writes.in_hand = True
             try:
                 yield
@@ -75,52 +67,11 @@ def finishing() -> Iterator[None]:
 
 
 def interrupt(number: int) -> None:
-    """Raise `Interrupted`, after children have finished their writes: whoever is told may kill them.
+    """Raise `Interrupted`, after the jobs of children have ended: whoever is told may kill them.
 
     Raises:
         Interrupted: always.
     """
     Heard.raised = number
-    if Writes.of_children is not None:
-        until = time.monotonic() + GRACE
-        while time.monotonic() < until and not _locks(Writes.of_children):
-            time.sleep(_PAUSE)
+    end_jobs_of_children()
     raise Interrupted(number)
-
-
-@contextlib.contextmanager
-def of_children_watched(file: Path) -> Iterator[None]:
-    """Processes that are started meanwhile lock `file` while they write.
-
-    Args:
-        file: to be made.
-    """
-    Writes.of_children = os.open(file, os.O_RDWR | os.O_CREAT)
-    os.environ[_SHARED] = str(file)
-    try:
-        yield
-    finally:
-        del os.environ[_SHARED]
-        os.close(Writes.of_children)
-        Writes.of_children = None
-
-
-@contextlib.contextmanager
-def _known_to_parent() -> Iterator[None]:
-    """Have the parent wait, if there is one that asked for it."""
-    file = os.environ.get(_SHARED)
-    with contextlib.ExitStack() as ending:
-        if file is not None and Writes.of_children is None:
-            with contextlib.suppress(OSError):  # whoever started this is gone, and the file with it
-                descriptor = os.open(file, os.O_RDWR)
-                ending.callback(os.close, descriptor)
-                fcntl.flock(descriptor, fcntl.LOCK_SH)
-        yield
-
-
-def _locks(descriptor: int) -> bool:
-    """Whether nobody writes now; nobody begins to after that."""
-    with contextlib.suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return True
-    return False

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -49,46 +48,6 @@ def test_a_process_is_not_ended_amid_a_write() -> None:
             time.sleep(60)
     """)
     assert (done.stdout, done.returncode) == ("written\n", 143)
-
-
-WRITING = """
-import pathlib, sys, time
-from exneat_cli.interruption import finishing
-with finishing():
-    print("begun", flush=True)
-    time.sleep(0.3)
-    pathlib.Path(sys.argv[1]).touch()
-time.sleep(60)
-"""
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_children_finish_their_writes_before_anybody_may_kill_them(tmp_path: Path, number: int) -> None:
-    done = in_process(f"""
-        from pathlib import Path
-        from exneat_cli.interruption import unheard_by_children, writes
-        writes.GRACE = 30.0
-        written = Path({str(tmp_path / "written")!r})
-        try:
-            with unheard_by_children():
-                child = subprocess.Popen([sys.executable, "-c", {WRITING!r}, str(written)], stdout=subprocess.PIPE)
-                child.stdout.readline()
-                os.kill(os.getpid(), {int(number)})
-                time.sleep(60)
-        except KeyboardInterrupt:
-            print(written.exists())
-            child.kill()
-    """)
-    assert (done.stdout, done.stderr) == ("True\n", "")
-
-
-def test_a_child_writes_though_whoever_started_it_is_gone(tmp_path: Path) -> None:
-    done = in_process(f"""
-        os.environ["EXNEAT_WRITES"] = {str(tmp_path / "gone" / "writes")!r}
-        with finishing():
-            print("written")
-    """)
-    assert done.stdout == "written\n"
 
 
 WITH_GENERATORS = """

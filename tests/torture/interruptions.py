@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 import signal
@@ -53,6 +54,7 @@ class _Stop(NamedTuple):
     left: int
     files: int
     how: str
+    unmarked: int = 0
 
 
 def interrupt(count: int, seed: int) -> list[Finding]:
@@ -95,6 +97,7 @@ def _figures(count: int, stops: list[_Stop], mistakes: Mistakes) -> list[Finding
         at_most("longest end after a signal, s", max(stop.seconds for stop in stops), BAR),
         exactly("processes left", sum(stop.left for stop in stops), 0),
         exactly("temporary files left", sum(stop.files for stop in stops), 0),
+        exactly("runs not marked interrupted", sum(stop.unmarked for stop in stops), 0),
         mistakes.none_of("wrong exit codes, missing lines, or resumes with other bytes"),
     ]
 
@@ -157,4 +160,10 @@ def _judge(
         mistakes.add(f"{name}: does not end in one line that says how to go on: {errors[-300:]}")
     if left or files or seconds > BAR:
         say(f"  {name}: {seconds:.1f} s, {left} processes and {files} temporary files left")
-    return _Stop(seconds, left, files, "stopped")
+    return _Stop(seconds, left, files, "stopped", _unmarked(program.temporary.parent / "out"))
+
+
+def _unmarked(output: Path) -> int:
+    """How many runs are still said to be running."""
+    manifests = [json.loads(path.read_text()) for path in output.glob("*/*/manifest.json")]
+    return sum(manifest["status"] == "running" for manifest in manifests)
