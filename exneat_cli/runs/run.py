@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -101,21 +101,35 @@ def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress
         _tell_other_versions(before, progress)
         manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
         directory.forget_what_was_derived()
-    directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+    with _marking_interruption(directory):
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        try:
+            with heeding():
+                result = _do(settings, directory, progress)
+        except Exception as error:
+            with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+                directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            progress.stop()
+        directory.update_manifest(status=DONE, finished=_now(), result=result)
+
+
+@contextlib.contextmanager
+def _marking_interruption(directory: RunDirectory) -> Iterator[None]:
+    """Whoever looks at the run later is told that it was interrupted amid the block."""
+
+    def mark() -> None:
+        if directory.read_manifest().get("status") == RUNNING:
+            directory.update_manifest(status=INTERRUPTED)
+
     try:
-        with heeding(), before_the_end(lambda: directory.update_manifest(status=INTERRUPTED)):
-            result = _do(settings, directory, progress)
+        with before_the_end(mark):
+            yield
     except KeyboardInterrupt:
         with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure
-            directory.update_manifest(status=INTERRUPTED)
+            mark()
         raise
-    except BaseException as error:
-        with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
-        raise
-    finally:
-        progress.stop()
-    directory.update_manifest(status=DONE, finished=_now(), result=result)
 
 
 def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:
