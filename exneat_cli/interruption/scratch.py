@@ -24,18 +24,21 @@ def scratch_directory(prefix: str = "exneat-", above: Path | None = None) -> Ite
     Raises:
         OSError: it cannot be made.
     """
-    with uninterrupted():
-        path = Path(tempfile.mkdtemp(prefix=prefix, dir=above))
-        _there.add(path)
-    try:
+    with contextlib.ExitStack() as ending:
+        with uninterrupted():
+            path = Path(tempfile.mkdtemp(prefix=prefix, dir=above))
+            _there.add(path)
+            ending.callback(_delete, path)
         yield path
-    finally:
-        with finishing():
-            shutil.rmtree(path, ignore_errors=True)
-            _there.discard(path)
 
 
 def delete_scratch() -> None:
     """Delete all such directories now."""
     for path in tuple(_there):
         shutil.rmtree(path, ignore_errors=True)
+
+
+def _delete(path: Path) -> None:
+    with finishing():
+        shutil.rmtree(path, ignore_errors=True)
+        _there.discard(path)
