@@ -62,7 +62,7 @@ def _printable(message: str) -> str:
 
 
 def program() -> int:
-    """What the installed program calls: `main`, after which a late signal changes nothing."""
+    """What the installed program calls: as `main`, but a late signal changes nothing any more."""
     listen()
     code = _answer(sys.argv[1:])
     stop_listening()

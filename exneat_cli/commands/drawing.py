@@ -9,7 +9,7 @@ from exneat_cli.records import RunDirectory
 
 
 def missing_figures(directory: RunDirectory, *, swept: bool) -> list[str]:
-    """Names of the figures that a finished run has data for, but no picture, or one older than its data."""
+    """Names of the figures that a finished run has data for, but no picture; of robustness also an older one."""
     data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
     missing = [name for name, path in data.items() if path.exists() and not _picture(directory, name).exists()]
     return [*missing, "robustness"] if swept and _is_robustness_missing(directory) else missing

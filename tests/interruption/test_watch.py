@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -9,19 +10,25 @@ import pytest
 from tests.interruption.processes import in_process, is_running
 
 
+def end_with_child(note: Path, code: str) -> tuple[int, bool]:
+    """Exit code of a process that starts a child and then runs this code, and whether the child outlived it."""
+    child = f"child = subprocess.Popen(['sleep', '600'])\nopen({str(note)!r}, 'w').write(str(child.pid))\n"
+    done = in_process(child + textwrap.dedent(code))
+    return done.returncode, is_running(int(note.read_text()))
+
+
 def test_a_process_that_swallows_the_signal_is_ended_with_its_children(tmp_path: Path) -> None:
-    note = tmp_path / "child"
-    done = in_process(f"""
-        child = subprocess.Popen(["sleep", "600"])
-        open({str(note)!r}, "w").write(str(child.pid))
+    code, child_is_running = end_with_child(
+        tmp_path / "child",
+        """
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(600)
         except KeyboardInterrupt:
             time.sleep(600)
-    """)
-    assert done.returncode == 143
-    assert not is_running(int(note.read_text()))
+    """,
+    )
+    assert (code, child_is_running) == (143, False)
 
 
 SWALLOWED = """
@@ -47,10 +54,9 @@ def test_a_process_that_swallows_the_exception_is_ended_with_the_line_that_says_
 
 
 def test_a_second_signal_ends_children_too_though_the_main_thread_ends_by_itself(tmp_path: Path) -> None:
-    note = tmp_path / "child"
-    done = in_process(f"""
-        child = subprocess.Popen(["sleep", "600"])
-        open({str(note)!r}, "w").write(str(child.pid))
+    code, child_is_running = end_with_child(
+        tmp_path / "child",
+        """
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(60)
@@ -58,9 +64,9 @@ def test_a_second_signal_ends_children_too_though_the_main_thread_ends_by_itself
             time.sleep(0.3)
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(60)
-    """)
-    assert done.returncode == 143
-    assert not is_running(int(note.read_text()))
+    """,
+    )
+    assert (code, child_is_running) == (143, False)
 
 
 IN_COMPILED_CODE = """
@@ -94,8 +100,7 @@ def test_a_main_thread_in_compiled_code_is_ended_and_its_temporary_files_deleted
 
 def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
     done = in_process("""
-        from exneat_cli import interruption
-        from exneat_cli.interruption import handlers, watch
+        from exneat_cli.interruption import watch
         watch.PATIENCE = 0.1
         for _ in range(3):
             try:
@@ -109,7 +114,7 @@ def test_a_watch_that_was_called_off_lets_the_process_live() -> None:
 
 
 LAST_ACTS = """
-import hashlib, os, signal, sys, threading
+import hashlib, os, signal, threading
 from exneat_cli.interruption import before_the_end, listen, watch
 
 def fail():

@@ -36,8 +36,7 @@ def test_a_write_in_hand_is_finished_first() -> None:
 
 def test_a_process_is_not_ended_amid_a_write() -> None:
     done = in_process("""
-        from exneat_cli import interruption
-        from exneat_cli.interruption import handlers, watch
+        from exneat_cli.interruption import watch
         watch.PATIENCE, watch.GRACE = 0.1, 60.0
         try:
             with finishing():
@@ -55,7 +54,7 @@ import random, signal
 from exneat_cli.evolution import EvolutionSettings
 from exneat_cli.evolution.settings import neat_config
 from exneat_cli.evolution.subpopulation import Subpopulation
-from exneat_cli.interruption import Interrupted, handlers, listen
+from exneat_cli.interruption import Interrupted, handlers
 from exneat_cli.seeding import stream
 
 settings = EvolutionSettings()
