@@ -1,6 +1,6 @@
-"""Errors that a user can mend, and the checks that raise them.
+"""Errors that a user can fix, and the checks that raise them.
 
-Every message names the thing, what was expected, what came and how to mend it, in at most three
+Every message names the thing, what was expected, what came and how to fix it, in at most three
 lines; `exneat_cli.main` prints it without a traceback and exits with code 2.
 """
 
@@ -15,7 +15,7 @@ _LONGEST_VALUE = 160
 
 
 class ExneatError(Exception):
-    """Something that the user can mend: bad input, an unusable directory, a missing file."""
+    """Something that the user can fix: bad input, an unusable directory, a missing file."""
 
 
 class ConfigError(ExneatError):
@@ -25,17 +25,17 @@ class ConfigError(ExneatError):
         key: the setting's dotted name, as on the command line, e.g. ``noise.sensor_std``.
         expected: what would have been accepted, in words.
         came: the value that was given.
-        mend: one sentence on how to put it right; left out where `expected` says it already.
+        fix: one sentence on how to put it right; left out where `expected` says it already.
     """
 
-    def __init__(self, key: str, expected: str, came: object, mend: str = "") -> None:
-        super().__init__(key, expected, came, mend)
+    def __init__(self, key: str, expected: str, came: object, fix: str = "") -> None:
+        super().__init__(key, expected, came, fix)
         self.key = key
 
     def __str__(self) -> str:
-        key, expected, came, mend = self.args
+        key, expected, came, fix = self.args
         message = f"{key}: expected {expected}, got {shortened(came)}"
-        return f"{message}\n  {mend}" if mend else message
+        return f"{message}\n  {fix}" if fix else message
 
 
 def shortened(value: object) -> str:

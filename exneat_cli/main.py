@@ -14,12 +14,12 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import heeding, listen, listening, stop_listening, tell_how_to_go_on
 
 COMMANDS = {
-    "train": "train one arm with one seed; -m trains every combination",
-    "sweep": "train all arms of an experiment and test how they hold up",
+    "train": "train one variant with one seed; -m trains every combination",
+    "sweep": "train all variants of an experiment and test how they hold up",
     "evaluate": "test finished runs under perturbations",
     "report": "make tables, figures and a page of them from the runs there are",
     "inspect": "show a run's wiring, or list the runs",
-    "doctor": "say whether this machine is fit for exneat, and what to mend",
+    "doctor": "say whether this machine is fit for exneat, and what to fix",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
@@ -47,7 +47,7 @@ usage: exneat <command> [key=value ...]
   exneat train task=ant algorithm=neat seed=3   the same task for NEAT
   exneat train -m seed=0,1,2 noise.sensor_std=0,0.1
   exneat train --help                           every setting with its default
-  exneat sweep experiment=track_maze            all arms, conditions and seeds, trained and tested
+  exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
   exneat report                                 outputs/report/index.html
   exneat inspect                                the runs under outputs/

@@ -2,7 +2,7 @@
 
 Each purpose has a number of its own in the spawn key of a `numpy.random.SeedSequence`, so streams of
 different purposes never meet, and a new purpose leaves the others as they are. Validation and test
-episodes grow from a constant instead of the run's seed: every run and every arm faces the same ones.
+episodes grow from a constant instead of the run's seed: every run and every variant faces the same ones.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def training_episodes(root: int, generation: int, count: int) -> list[EpisodeSee
 
 
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
-    """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and arms."""
+    """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and variants."""
     return [
         EpisodeSeeds(*(stream(SHARED_ROOT, purpose, episode, kind) for kind in range(len(EpisodeSeeds._fields))))
         for episode in range(count)

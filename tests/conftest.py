@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from exneat_cli.evolution import RECURRENT, EvolutionSettings
+from exneat_cli.algorithms import RECURRENT, EvolutionSettings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 

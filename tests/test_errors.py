@@ -10,14 +10,14 @@ import pytest
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
 
 
-def test_a_config_error_names_key_expectation_value_and_mend() -> None:
+def test_a_config_error_names_key_expectation_value_and_fix() -> None:
     error = ConfigError("noise.sensor_std", "a number", "x", "set it to 0")
     assert str(error) == "noise.sensor_std: expected a number, got 'x'\n  set it to 0"
 
 
 def test_a_config_error_survives_the_trip_from_another_process() -> None:
-    error = pickle.loads(pickle.dumps(ConfigError("seed", "a number", 3, "mend")))
-    assert str(error) == "seed: expected a number, got 3\n  mend"
+    error = pickle.loads(pickle.dumps(ConfigError("seed", "a number", 3, "fix")))
+    assert str(error) == "seed: expected a number, got 3\n  fix"
 
 
 @pytest.mark.parametrize("value", [True, 1.0, "1", None, -1, 11])

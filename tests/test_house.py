@@ -9,14 +9,14 @@ from pathlib import Path
 import exneat_cli
 
 PACKAGE = Path(exneat_cli.__file__).parent
-ROOMS = ["tasks", "wiring", "evolution", "brains", "rollouts", "records", "runs", "analysis", "commands", "main"]
-FREE = {"errors", "interruption", "seeding"}
+ROOMS = ["tasks", "wiring", "algorithms", "brains", "rollouts", "records", "runs", "analysis", "commands", "main"]
+FREE = {"compiling", "errors", "interruption", "seeding"}
 FENCES = {
     "hydra": {"main", "commands"},
     "omegaconf": {"main", "commands"},
     "gymnasium": {"tasks"},
     "mujoco": {"tasks"},
-    "neat": {"evolution", "brains"},
+    "neat": {"algorithms", "brains"},
     "matplotlib": {"analysis"},
     "dask": {"rollouts"},
     "distributed": {"rollouts"},
@@ -72,7 +72,7 @@ def test_runs_and_analysis_do_not_know_each_other() -> None:
 
 
 def test_analysis_never_touches_genomes_or_simulators() -> None:
-    forbidden = tuple(f"exneat_cli.{room}" for room in ("tasks", "evolution", "brains", "rollouts"))
+    forbidden = tuple(f"exneat_cli.{room}" for room in ("tasks", "algorithms", "brains", "rollouts"))
     wrong = [name for room, path in modules() if room == "analysis" for name in imports_of(path)]
     assert not [name for name in wrong if name.startswith(forbidden)]
 

@@ -1,4 +1,4 @@
-"""What runs spent on training, and whether arms that are compared spent the same."""
+"""What runs spent on training, and whether variants that are compared spent the same."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from exneat_cli.analysis.study import Study
 
 @dataclass(frozen=True)
 class Spent:
-    """What the runs of one arm spent; one entry per run in each.
+    """What the runs of one variant spent; one entry per run in each.
 
     Attributes:
         episodes, env_steps: of training.
@@ -22,52 +22,52 @@ class Spent:
     wall_seconds: tuple[float, ...]
 
 
-def spent_in(study: Study, condition: str, arms: Iterable[str]) -> dict[str, Spent]:
-    """What the finished runs of each arm spent, by label; arms without any are left out, and so are baselines."""
+def spent_in(study: Study, condition: str, variants: Iterable[str]) -> dict[str, Spent]:
+    """What the finished runs of each variant spent, by label; baselines and variants without any are left out."""
     found = {}
-    for arm in arms:
-        manifests = [run.directory.read_manifest() for run in study.of(condition, arm)]
+    for variant in variants:
+        manifests = [run.directory.read_manifest() for run in study.of(condition, variant)]
         budgets = [manifest["budget_spent"] for manifest in manifests if "budget_spent" in manifest]
         if budgets:
             columns = [tuple(b[key] for b in budgets) for key in ("episodes", "env_steps", "wall_seconds")]
-            found[study.arms[arm]] = Spent(*columns)
+            found[study.variants[variant]] = Spent(*columns)
     return found
 
 
 def equal_budgets(spent: Mapping[str, Spent]) -> bool:
-    """Whether all runs of all arms had exactly the same number of training episodes."""
+    """Whether all runs of all variants had exactly the same number of training episodes."""
     return len({episodes for each in spent.values() for episodes in each.episodes}) <= 1
 
 
 def budget_sentence(conditions: Iterable[Mapping[str, Spent]]) -> str:
-    """Says whether arms had equal budgets, and how many environment steps each took.
+    """Says whether variants had equal budgets, and how many environment steps each took.
 
-    Episodes are what a budget sets; steps follow from how long an arm's episodes last, so arms with equal
+    Episodes are what a budget sets; steps follow from how long a variant's episodes last, so variants with equal
     budgets differ in them.
 
     Args:
-        conditions: of each condition, what each arm spent, by label. Arms are compared within conditions.
+        conditions: of each condition, what each variant spent, by label. Variants are compared within conditions.
     """
     shown = [spent for spent in conditions if spent]
     episodes: dict[str, list[int]] = {}
     steps: dict[str, list[int]] = {}
     for spent in shown:
-        for arm, each in spent.items():
-            episodes.setdefault(arm, []).extend(each.episodes)
-            steps.setdefault(arm, []).extend(each.env_steps)
+        for variant, each in spent.items():
+            episodes.setdefault(variant, []).extend(each.episodes)
+            steps.setdefault(variant, []).extend(each.env_steps)
     if not shown:
         return "No run has spent anything on training."
     compared = [spent for spent in shown if len(spent) > 1]
     if not compared:
-        verdict = "No two arms have finished runs of the same condition, so there are no budgets to compare"
+        verdict = "No two variants have finished runs of the same condition, so there are no budgets to compare"
     elif all(equal_budgets(spent) for spent in compared):
         every = _range([count for counts in episodes.values() for count in counts])
-        verdict = f"All arms had equal budgets of {every} training episodes per run"
+        verdict = f"All variants had equal budgets of {every} training episodes per run"
     else:
-        each_arm = "; ".join(f"{arm} {_range(counts)}" for arm, counts in episodes.items())
-        verdict = f"The arms had unequal budgets of training episodes per run ({each_arm})"
-    # Labels of arms may hold commas.
-    means = "; ".join(f"{arm} {sum(counts) / len(counts):,.0f}" for arm, counts in steps.items())
+        each_variant = "; ".join(f"{variant} {_range(counts)}" for variant, counts in episodes.items())
+        verdict = f"The variants had unequal budgets of training episodes per run ({each_variant})"
+    # Labels of variants may hold commas.
+    means = "; ".join(f"{variant} {sum(counts) / len(counts):,.0f}" for variant, counts in steps.items())
     return f"{verdict}; environment steps per run, on average: {means}."
 
 

@@ -10,11 +10,14 @@ from exneat_cli.analysis.study import Study
 ENOUGH_RUNS = 10
 
 
-def runs_sentence(study: Study, conditions: Sequence[str], arms: Iterable[str]) -> str:
-    """Budget, and how many finished runs each arm has in the given conditions."""
-    counts = [(study.arms[arm], sorted(len(study.of(condition, arm)) for condition in conditions)) for arm in arms]
+def runs_sentence(study: Study, conditions: Sequence[str], variants: Iterable[str]) -> str:
+    """Budget, and how many finished runs each variant has in the given conditions."""
+    counts = [
+        (study.variants[variant], sorted(len(study.of(condition, variant)) for condition in conditions))
+        for variant in variants
+    ]
     parts = [f"{label} {n[0]}" if n[0] == n[-1] else f"{label} {n[0]} to {n[-1]}" for label, n in counts]
-    # Labels of arms may hold commas.
+    # Labels of variants may hold commas.
     return f"Budget {study.budget}; finished runs per condition: {'; '.join(parts)}."
 
 
@@ -32,16 +35,16 @@ def interval_sentence() -> str:
 
 def test_sentence(study: Study) -> str:
     """What p and A12 compare."""
-    first = next(iter(study.arms.values()))
+    first = next(iter(study.variants.values()))
     return (
-        f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained arms of a condition. "
-        f"A12: chance that a run of the arm beats a run of {first}, a tie counting half."
+        f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition. "
+        f"A12: chance that a run of the variant beats a run of {first}, a tie counting half."
     )
 
 
 def efficiency_sentence(study: Study) -> str:
     """What efficiency counts."""
-    first = next(iter(study.arms.values()))
+    first = next(iter(study.variants.values()))
     return (
         "Efficiency: first generation, counted from 1, at which the mean best so far reaches the final mean of "
         f"{first}."
@@ -66,7 +69,7 @@ def quantity_sentence(study: Study, quantities: Collection[str]) -> str:
     return f"{'; '.join(found).capitalize()}.{fitness}" if found else fitness.strip()
 
 
-def budgets_sentence(study: Study, conditions: Iterable[str], arms: Iterable[str]) -> str:
-    """Whether the given arms had equal budgets in each of the given conditions."""
-    compared = list(arms)
+def budgets_sentence(study: Study, conditions: Iterable[str], variants: Iterable[str]) -> str:
+    """Whether the given variants had equal budgets in each of the given conditions."""
+    compared = list(variants)
     return budget_sentence(spent_in(study, condition, compared) for condition in conditions)

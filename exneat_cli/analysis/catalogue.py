@@ -26,7 +26,7 @@ class Panel:
         sweep: name of the robustness sweep on the horizontal axis; needed by robustness and cluster.
         value: ``fitness`` or ``full_reward``.
         highest: levels above it are left out.
-        arm: whose champion a network panel shows.
+        variant: whose champion a network panel shows.
     """
 
     experiment: str
@@ -34,7 +34,7 @@ class Panel:
     sweep: str | None = None
     value: str = "fitness"
     highest: float | None = None
-    arm: str | None = None
+    variant: str | None = None
 
     def __post_init__(self) -> None:
         check_choice("value", self.value, VALUES)
@@ -49,14 +49,14 @@ class FigurePlan:
         kind: one of `FIGURE_KINDS`.
         title: above the picture, and first in its caption.
         panels: from left to right.
-        arms: the trained arms that it shows; empty for all.
+        variants: the trained variants that it shows; empty for all.
     """
 
     name: str
     kind: str
     title: str
     panels: tuple[Panel, ...]
-    arms: tuple[str, ...] = ()
+    variants: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Column:
     Attributes:
         of: ``training`` (final best so far), ``test`` (the champion on the test episodes), ``efficiency``
             (first generation, from 1, at which the mean best so far reaches the final mean of the first
-            arm), or ``robustness``.
+            variant), or ``robustness``.
         sweep, level, value: which entry of the robustness sweeps.
     """
 
@@ -82,11 +82,11 @@ class Column:
 
 @dataclass(frozen=True)
 class TableRow:
-    """One arm in one condition; `published` holds what the thesis prints, by column, numbers or e.g. ``>20``."""
+    """One variant in one condition; `published` holds what the thesis prints, by column, numbers or e.g. ``>20``."""
 
     experiment: str
     condition: str
-    arm: str
+    variant: str
     published: Mapping[str, float | str] = field(default_factory=dict)
 
 
@@ -132,16 +132,16 @@ def _artefact(name: str, entry: dict[str, Any]) -> FigurePlan | TablePlan:
         rows = tuple(_build(TableRow, row) for row in entry.pop("rows"))
         return _build(TablePlan, {"name": name, "columns": columns, "rows": rows, **entry})
     panels = tuple(_panel(kind, panel) for panel in _some(entry.pop("panels")))
-    arms = tuple(entry.pop("arms", ()))
-    return _build(FigurePlan, {"name": name, "kind": kind, "panels": panels, "arms": arms, **entry})
+    variants = tuple(entry.pop("variants", ()))
+    return _build(FigurePlan, {"name": name, "kind": kind, "panels": panels, "variants": variants, **entry})
 
 
 def _panel(kind: str, values: Mapping[str, Any]) -> Panel:
     panel = _build(Panel, values)
     if kind in ("robustness", "cluster") and panel.sweep is None:
         raise ValueError(f"a panel of kind {kind} needs a sweep")
-    if kind == "network" and panel.arm is None:
-        raise ValueError("a panel of kind network needs an arm")
+    if kind == "network" and panel.variant is None:
+        raise ValueError("a panel of kind network needs a variant")
     return panel
 
 

@@ -1,4 +1,4 @@
-"""One table per experiment: every arm in every condition that has been run."""
+"""One table per experiment: every variant in every condition that has been run."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ _VERDICT = ("test_p_holm", "test_a12", "efficiency")
 
 @dataclass(frozen=True)
 class _Line:
-    """One arm in one condition, both by label; `summaries` are by the names of `_COLUMNS`."""
+    """One variant in one condition, both by label; `summaries` are by the names of `_COLUMNS`."""
 
     condition: str
-    arm: str
+    variant: str
     runs: int
     summaries: dict[str, Summary]
     efficiency: str
 
 
 def build_comparison(study: Study, directory: Path) -> Built:
-    """Write ``comparison-<experiment>.csv`` and ``.md``: one line per condition and arm, trained or not.
+    """Write ``comparison-<experiment>.csv`` and ``.md``: one line per condition and variant, trained or not.
 
-    Conditions without a finished run are left out. Where the first arm has none, nothing is compared with it.
+    Conditions without a finished run are left out. Where the first variant has none, nothing is compared with it.
 
     Args:
         study: what was run.
@@ -47,7 +47,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
         MissingRunsError: no run is finished at all.
         ExneatError: a file cannot be written.
     """
-    conditions = [c for c in study.conditions if any(study.of(c, arm) for arm in study.arms)]
+    conditions = [c for c in study.conditions if any(study.of(c, variant) for variant in study.variants)]
     if not conditions:
         raise MissingRunsError(
             f"{study.experiment}, budget {study.budget}: no finished run to compare\n  {study.command}"
@@ -57,7 +57,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
     decimals = {name: decimals_for(_printed(lines, name)) for name in names}
     table = Built(
         name=f"comparison-{study.experiment}",
-        title=f"All arms of {study.experiment}",
+        title=f"All variants of {study.experiment}",
         caption=" ".join(filter(None, _sentences(study, conditions, names))),
         paths=(),
         header=_header(names),
@@ -69,15 +69,17 @@ def build_comparison(study: Study, directory: Path) -> Built:
 def _lines(study: Study, condition: str, names: Sequence[str]) -> Iterator[_Line]:
     compared = {}
     for name in names:
-        values = {arm: list(per_run(study, condition, arm, _COLUMNS[name]).values()) for arm in study.arms}
+        values = {
+            variant: list(per_run(study, condition, variant, _COLUMNS[name]).values()) for variant in study.variants
+        }
         compared[name] = compare(values, study.baselines)
-    for arm, label in study.arms.items():
+    for variant, label in study.variants.items():
         yield _Line(
             condition=study.conditions[condition],
-            arm=label,
-            runs=len(study.of(condition, arm)),
-            summaries={name: compared[name][arm] for name in names},
-            efficiency=efficiency_of(study, condition, arm),
+            variant=label,
+            runs=len(study.of(condition, variant)),
+            summaries={name: compared[name][variant] for name in names},
+            efficiency=efficiency_of(study, condition, variant),
         )
 
 
@@ -89,7 +91,7 @@ def _printed(lines: Sequence[_Line], name: str) -> Iterator[float]:
 
 def _header(names: Sequence[str]) -> tuple[str, ...]:
     figures = [cell for name in names for cell in (name.replace("_", " "), "95% interval")]
-    return ("condition", "arm", "runs", *figures, "test IQM", "test p (Holm)", "test A12", "efficiency")
+    return ("condition", "variant", "runs", *figures, "test IQM", "test p (Holm)", "test A12", "efficiency")
 
 
 def _cells(line: _Line, decimals: dict[str, int]) -> tuple[str, ...]:
@@ -100,12 +102,12 @@ def _cells(line: _Line, decimals: dict[str, int]) -> tuple[str, ...]:
     ]
     test = line.summaries["test"]
     verdict = (figure_cell(test.iqm, decimals["test"]), p_cell(test.p), figure_cell(test.a12, 2), line.efficiency)
-    return (line.condition, line.arm, str(line.runs), *figures, *verdict)
+    return (line.condition, line.variant, str(line.runs), *figures, *verdict)
 
 
 def _csv_header(names: Sequence[str]) -> tuple[str, ...]:
     figures = [f"{name}_{figure}" for name in names for figure in ("mean", "low", "high", "iqm")]
-    return ("condition", "arm", "runs", *figures, *_VERDICT)
+    return ("condition", "variant", "runs", *figures, *_VERDICT)
 
 
 def _exact(line: _Line, names: Sequence[str]) -> tuple[object, ...]:
@@ -113,15 +115,15 @@ def _exact(line: _Line, names: Sequence[str]) -> tuple[object, ...]:
         figure for each in (line.summaries[name] for name in names) for figure in (each.mean, *each.interval, each.iqm)
     ]
     test = line.summaries["test"]
-    return (line.condition, line.arm, line.runs, *figures, test.p, test.a12, line.efficiency)
+    return (line.condition, line.variant, line.runs, *figures, test.p, test.a12, line.efficiency)
 
 
 def _sentences(study: Study, conditions: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    trained = [len(study.of(condition, arm)) for condition in conditions for arm in study.trained_arms]
-    yield captions.runs_sentence(study, conditions, study.arms)
+    trained = [len(study.of(condition, variant)) for condition in conditions for variant in study.trained_variants]
+    yield captions.runs_sentence(study, conditions, study.variants)
     yield captions.quantity_sentence(study, names)
     yield captions.interval_sentence()
     yield captions.few_runs_sentence(min((runs for runs in trained if runs), default=math.inf))
     yield captions.test_sentence(study)
     yield captions.efficiency_sentence(study)
-    yield captions.budgets_sentence(study, conditions, study.trained_arms)
+    yield captions.budgets_sentence(study, conditions, study.trained_variants)

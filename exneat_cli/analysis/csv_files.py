@@ -9,7 +9,7 @@ import pandas as pd
 
 from exneat_cli.errors import ExneatError
 
-_WORDS = ("arm", "parameter")
+_WORDS = ("variant", "parameter")
 
 
 def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
@@ -17,7 +17,7 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
 
     Args:
         path: of the file.
-        columns: that it must have; all but ``arm`` and ``parameter`` must hold numbers.
+        columns: that it must have; all but ``variant`` and ``parameter`` must hold numbers.
 
     Raises:
         ExneatError: the file is missing or damaged.

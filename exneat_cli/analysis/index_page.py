@@ -90,23 +90,23 @@ def _run_part(study: Study) -> Iterator[str]:
     spent = [manifest["budget_spent"] for manifest in manifests if "budget_spent" in manifest]
     steps = sum(each["env_steps"] for each in spent)
     took = _duration(sum(each["wall_seconds"] for each in spent))
-    rows = [_arm_row(study, arm) for arm in study.arms]
-    conditions = [c for c in study.conditions if any(study.of(c, arm) for arm in study.trained_arms)]
+    rows = [_variant_row(study, variant) for variant in study.variants]
+    conditions = [c for c in study.conditions if any(study.of(c, variant) for variant in study.trained_variants)]
     yield f'<h3 id="{anchor(f"run-{study.experiment}")}">{text(study.experiment)}</h3>'
     yield f"<p>Claim: {text(study.claim)}</p>"
     yield (
         f"<p>Budget {text(study.budget)}: {len(study.finished)} of {len(study.runs)} runs finished, "
         f"{steps:,} environment steps of training, {took} of training time.</p>"
     )
-    yield table(f"Runs of {study.experiment}", ("arm", "runs finished", "runs planned", "seeds"), rows)
-    yield f"<p>{text(budgets_sentence(study, conditions, study.trained_arms))}</p>"
+    yield table(f"Runs of {study.experiment}", ("variant", "runs finished", "runs planned", "seeds"), rows)
+    yield f"<p>{text(budgets_sentence(study, conditions, study.trained_variants))}</p>"
     yield f"<p>Versions: {text(_versions(manifests) or 'none, as no run is finished')}.</p>"
 
 
-def _arm_row(study: Study, arm: str) -> tuple[str, ...]:
-    planned = [run for run in study.runs if run.arm == arm]
-    finished = sum(run.arm == arm for run in study.finished)
-    return (study.arms[arm], str(finished), str(len(planned)), _ranges(sorted({run.seed for run in planned})))
+def _variant_row(study: Study, variant: str) -> tuple[str, ...]:
+    planned = [run for run in study.runs if run.variant == variant]
+    finished = sum(run.variant == variant for run in study.finished)
+    return (study.variants[variant], str(finished), str(len(planned)), _ranges(sorted({run.seed for run in planned})))
 
 
 def _versions(manifests: Sequence[Mapping[str, Any]]) -> str:
@@ -163,6 +163,6 @@ def _missing_parts(studies: Mapping[str, Study], missing: Mapping[str, str]) -> 
         return
     yield "<ul>"
     for name, why, command in items:
-        mended_by = f"<pre><code>{text(command)}</code></pre>" if command else ""
-        yield f"<li><strong>{text(name)}</strong>: {text(why)}{mended_by}</li>"
+        fixed_by = f"<pre><code>{text(command)}</code></pre>" if command else ""
+        yield f"<li><strong>{text(name)}</strong>: {text(why)}{fixed_by}</li>"
     yield "</ul>"

@@ -1,4 +1,4 @@
-"""Champions of a report, side by side: of each arm the one whose run was best on validation."""
+"""Champions of a report, side by side: of each variant the one whose run was best on validation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Figu
     """The figure, and sentences that say whose champions these are.
 
     Raises:
-        MissingRunsError: an arm has no finished run.
+        MissingRunsError: a variant has no finished run.
     """
     runs = [best_run(panel, studies[panel.experiment]) for panel in plan.panels]
     graphs = [read_champion_graph(run.directory) for run in runs]
@@ -44,25 +44,25 @@ def draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Figu
 
 
 def best_run(panel: Panel, study: Study) -> PlannedRun:
-    """The finished run of the panel's arm that was best on validation, the lowest seed among equals.
+    """The finished run of the panel's variant that was best on validation, the lowest seed among equals.
 
     Raises:
-        MissingRunsError: the arm has no finished run.
+        MissingRunsError: the variant has no finished run.
     """
-    assert panel.arm is not None
-    study.require(panel.condition, [panel.arm])
-    validation = study.results(panel.condition, panel.arm)["validation"].fillna(float("-inf"))
-    return study.of(panel.condition, panel.arm)[int(validation.to_numpy().argmax())]
+    assert panel.variant is not None
+    study.require(panel.condition, [panel.variant])
+    validation = study.results(panel.condition, panel.variant)["validation"].fillna(float("-inf"))
+    return study.of(panel.condition, panel.variant)[int(validation.to_numpy().argmax())]
 
 
 def _title(panel: Panel, study: Study) -> str:
-    assert panel.arm is not None
-    return f"{study.arms[panel.arm]}, {study.conditions[panel.condition]}"
+    assert panel.variant is not None
+    return f"{study.variants[panel.variant]}, {study.conditions[panel.condition]}"
 
 
 def _whose(panel: Panel, run: PlannedRun, graph: ChampionGraph, title: str, studies: Mapping[str, Study]) -> str:
     study = studies[panel.experiment]
-    runs = len(study.of(run.condition, run.arm))
+    runs = len(study.of(run.condition, run.variant))
     chosen = f"best on validation of {runs} runs" if runs > 1 else "the only run"
     earned = f"test {study.fitness_name} {graph.test_fitness:.4g}"
     return f"{title}: seed {run.seed}, {chosen}, budget {study.budget}, {earned}."

@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, FancyBboxPatch, PathPatch
 from matplotlib.path import Path as Outline
 
-from exneat_cli.analysis.arm_styles import BLACK, BLUE, GREEN, OLIVE, ORANGE, PURPLE, SKY, VERMILION
 from exneat_cli.analysis.figures import new_figure, save_figure, style
 from exneat_cli.analysis.network_data import ChampionGraph, Edge, Link, Node, read_champion_graph
 from exneat_cli.analysis.network_layout import Layout, lay_out, natural_size, pin_groups
+from exneat_cli.analysis.variant_styles import BLACK, BLUE, GREEN, OLIVE, ORANGE, PURPLE, SKY, VERMILION
 from exneat_cli.records import RunDirectory
 from exneat_cli.wiring import Module
 

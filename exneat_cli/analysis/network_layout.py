@@ -58,7 +58,7 @@ class Layout:
 def page_direction(modules: Sequence[Module]) -> list[tuple[float, float]]:
     """Where each module lies as one looks at the page: to the right, and up.
 
-    A body looks up the page: x ahead is up, y to the left is left. The sectors of a map, which are called
+    A body looks up the page: x ahead is up, y to the left is left. The parts of a map, which are called
     up and down, keep the map's x and y.
     """
     if any(module.name in ("up", "down") for module in modules):

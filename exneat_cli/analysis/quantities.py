@@ -12,18 +12,18 @@ from exneat_cli.analysis.statistics import FloatArray, efficiency
 from exneat_cli.analysis.study import MissingRunsError, Study
 
 BEST = 5
-"""How many runs of each arm the thesis tests: those best on validation; Zhang (2025), table 5.5."""
+"""How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
 
 
-def per_run(study: Study, condition: str, arm: str, column: Column) -> dict[int, float]:
+def per_run(study: Study, condition: str, variant: str, column: Column) -> dict[int, float]:
     """Seed -> figure, in the order of seeds, for the finished runs that have one; may be empty.
 
-    A column of training, test or robustness can be asked for; efficiency is a figure of an arm, not of a run.
+    A column of training, test or robustness can be asked for; efficiency is a figure of a variant, not of a run.
     """
     if column.of == "robustness":
-        return _at_level(study.robustness(condition, arm), column)
+        return _at_level(study.robustness(condition, variant), column)
     of = "full_reward" if (column.of, column.value) == ("test", "full_reward") else column.of
-    return _by_seed(study.results(condition, arm), of)
+    return _by_seed(study.results(condition, variant), of)
 
 
 def _at_level(table: pd.DataFrame, column: Column) -> dict[int, float]:
@@ -38,42 +38,42 @@ def _by_seed(table: pd.DataFrame, column: str) -> dict[int, float]:
     return {int(seed): float(figure) for seed, figure in zip(rows["seed"], rows[column], strict=True)}
 
 
-def require_level(study: Study, condition: str, arms: Iterable[str], column: Column) -> None:
-    """Check that every one of `arms` was tested at the sweep and level of a robustness column.
+def require_level(study: Study, condition: str, variants: Iterable[str], column: Column) -> None:
+    """Check that every one of `variants` was tested at the sweep and level of a robustness column.
 
     Raises:
         MissingRunsError: one has no run that was.
     """
-    missing = [study.arms[arm] for arm in arms if not per_run(study, condition, arm, column)]
+    missing = [study.variants[variant] for variant in variants if not per_run(study, condition, variant, column)]
     if missing:
         what = f"{study.experiment}, {condition}, budget {study.budget}: sweep {column.sweep}, level {column.level}"
         raise MissingRunsError(f"{what}: not measured for {', '.join(missing)}\n  {study.command}")
 
 
-def best_on_validation(study: Study, condition: str, arm: str) -> list[int]:
-    """Seeds of the arm's runs from the best on validation down; equal ones by seed, those without a figure last."""
-    results = study.results(condition, arm).sort_values("seed")
+def best_on_validation(study: Study, condition: str, variant: str) -> list[int]:
+    """Seeds of the variant's runs from the best on validation down; equal ones by seed, those without a figure last."""
+    results = study.results(condition, variant).sort_values("seed")
     return [int(seed) for seed in results.sort_values("validation", ascending=False, kind="stable")["seed"]]
 
 
-def mean_curve(study: Study, condition: str, arm: str) -> FloatArray:
-    """Best so far over generations, mean of the arm's finished runs; shape (generations,), empty without runs."""
-    history = study.history(condition, arm)
+def mean_curve(study: Study, condition: str, variant: str) -> FloatArray:
+    """Best so far over generations, mean of the variant's finished runs; shape (generations,), empty without runs."""
+    history = study.history(condition, variant)
     if history.empty:
         return np.empty(0)
     return history.groupby("generation")["best_so_far"].mean().to_numpy(dtype=np.float64)
 
 
-def efficiency_of(study: Study, condition: str, arm: str) -> str:
-    """First generation at which the arm's mean curve reaches the final mean of the study's first arm.
+def efficiency_of(study: Study, condition: str, variant: str) -> str:
+    """First generation at which the variant's mean curve reaches the final mean of the study's first variant.
 
     Returns:
         e.g. ``7``, ``>20`` if 20 generations were not enough, or nothing if either has no curve.
     """
-    first = next(iter(study.arms))
-    if {first, arm} & set(study.baselines):
+    first = next(iter(study.variants))
+    if {first, variant} & set(study.baselines):
         return ""
-    curve, target = mean_curve(study, condition, arm), mean_curve(study, condition, first)
+    curve, target = mean_curve(study, condition, variant), mean_curve(study, condition, first)
     if not len(curve) or not len(target):
         return ""
     generation = efficiency(curve, float(target[-1]))

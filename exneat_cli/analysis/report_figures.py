@@ -42,7 +42,7 @@ _WHAT_IS_SHOWN = {
 _WITH_INTERVALS = ("training", "robustness")
 _SIZES = {1: (7.0, 4.8), 2: (10.4, 4.8)}
 _CLUSTER_SIZES = {1: (10.4, 5.2), 2: (16.0, 5.2)}
-"""Inches, by number of panels; clusters need room for every arm at every level."""
+"""Inches, by number of panels; clusters need room for every variant at every level."""
 _MORE_PANELS = 4.8
 _KEY_WIDTH, _LETTER_WIDTH = 0.6, 0.075
 """Inches that an entry of the legend takes, at least roughly."""
@@ -64,8 +64,8 @@ def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path,
     check_choice("axis", axis, AXES)
     for panel in plan.panels:
         _check_panel(plan, panel, studies)
-    if plan.arms:
-        studies = {name: study.only(plan.arms) for name, study in studies.items()}
+    if plan.variants:
+        studies = {name: study.only(plan.variants) for name, study in studies.items()}
     if plan.kind == "network":
         figure, sentences = draw_champions(plan, studies)
     else:
@@ -81,14 +81,14 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
     check_choice(f"{plan.name}: condition {whose}", panel.condition, tuple(study.conditions))
     if panel.sweep is not None:
         check_choice(f"{plan.name}: sweep {whose}", panel.sweep, tuple(study.sweeps))
-    if panel.arm is not None:
-        check_choice(f"{plan.name}: trained arm {whose}", panel.arm, study.trained_arms)
-    for arm in plan.arms:
-        check_choice(f"{plan.name}: trained arm {whose}", arm, study.trained_arms)
+    if panel.variant is not None:
+        check_choice(f"{plan.name}: trained variant {whose}", panel.variant, study.trained_variants)
+    for variant in plan.variants:
+        check_choice(f"{plan.name}: trained variant {whose}", variant, study.trained_variants)
     if panel.value == "full_reward" and not study.has_full_reward:
         raise ExneatError(f"{plan.name}: the task {whose} has no full reward; use value: fitness")
-    if not study.trained_arms:
-        raise MissingRunsError(f"{plan.name}: no arm {whose} is trained, so there are no runs to show")
+    if not study.trained_variants:
+        raise MissingRunsError(f"{plan.name}: no variant {whose} is trained, so there are no runs to show")
 
 
 def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> tuple[Figure, list[str]]:
@@ -125,10 +125,10 @@ def _sentences(plan: FigurePlan, studies: Mapping[str, Study], counts: list[dict
     for number, (panel, runs) in enumerate(zip(plan.panels, counts, strict=True), start=1):
         study = studies[panel.experiment]
         place = f"Panel {number}, " if len(plan.panels) > 1 else ""
-        listed = "; ".join(f"{study.arms[arm]} {count}" for arm, count in runs.items())
+        listed = "; ".join(f"{study.variants[variant]} {count}" for variant, count in runs.items())
         panels.append(f"{place}{study.conditions[panel.condition]}, number of runs: {listed}.")
-        learning = [arm for arm in runs if arm in study.trained_arms]
-        trained += [runs[arm] for arm in learning]
+        learning = [variant for variant in runs if variant in study.trained_variants]
+        trained += [runs[variant] for variant in learning]
         spent.append(spent_in(study, panel.condition, learning))
     panels[0] = panels[0][0].upper() + panels[0][1:]
     particulars = _particulars(plan.kind, axis, trained)
@@ -148,7 +148,7 @@ def _particulars(kind: str, axis: str, trained: list[int]) -> list[str]:
             "Between generations a run counts with its latest value, and a mean ends where the first of its runs does."
         )
     if kind == "robustness" and max(trained) > BEST:
-        sentences.append(f"Dashed lines: mean of the {BEST} runs of an arm that were best on validation.")
+        sentences.append(f"Dashed lines: mean of the {BEST} runs of a variant that were best on validation.")
     if kind in _WITH_INTERVALS:
         sentences.append(few_runs_sentence(min(trained)))
     return sentences

@@ -9,73 +9,73 @@ import pandas as pd
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from exneat_cli.analysis.arm_styles import ArmStyle, arm_styles
 from exneat_cli.analysis.catalogue import Panel
 from exneat_cli.analysis.figures import tick_levels
 from exneat_cli.analysis.quantities import BEST, best_on_validation
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import MissingRunsError, Study
+from exneat_cli.analysis.variant_styles import VariantStyle, variant_styles
 
 _ROUNDING = 1e-9
-_ANY_ARM = "#444444"
+_ANY_VARIANT = "#444444"
 
 
 def draw_levels(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
-    """Each arm's mean over runs at each level, with its 95% band; returns the number of runs of each arm.
+    """Each variant's mean over runs at each level, with its 95% band; returns the number of runs of each variant.
 
-    The dashed line of an arm is the mean over its `BEST` runs best on validation. It is left out
+    The dashed line of a variant is the mean over its `BEST` runs best on validation. It is left out
     where there are no more runs than that. Baselines are grey lines.
 
     Raises:
-        MissingRunsError: no trained arm has a finished sweep.
+        MissingRunsError: no trained variant has a finished sweep.
     """
     tables = swept_runs(panel, study)
-    styles = arm_styles(study.arms, study.baselines)
+    styles = variant_styles(study.variants, study.baselines)
     some_are_chosen = False
-    for arm, table in tables.items():
-        axes.plot(table.index, table.mean(axis=1), label=study.arms[arm], **styles[arm].mean)
-        if arm in study.baselines:
+    for variant, table in tables.items():
+        axes.plot(table.index, table.mean(axis=1), label=study.variants[variant], **styles[variant].mean)
+        if variant in study.baselines:
             continue
-        _draw_band(axes, table, styles[arm].colour)
+        _draw_band(axes, table, styles[variant].colour)
         if table.shape[1] > BEST:
-            ranked = [seed for seed in best_on_validation(study, panel.condition, arm) if seed in table]
+            ranked = [seed for seed in best_on_validation(study, panel.condition, variant) if seed in table]
             mean = table[ranked[:BEST]].mean(axis=1)
-            axes.plot(table.index, mean, "--", color=styles[arm].colour, linewidth=1.2, zorder=2)
+            axes.plot(table.index, mean, "--", color=styles[variant].colour, linewidth=1.2, zorder=2)
             some_are_chosen = True
     if some_are_chosen:
         label = f"mean of the {BEST} runs best on validation"
-        axes.plot([], [], "--", color=_ANY_ARM, linewidth=1.2, label=label)
+        axes.plot([], [], "--", color=_ANY_VARIANT, linewidth=1.2, label=label)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
     _label(axes, panel, study)
-    return {arm: table.shape[1] for arm, table in tables.items()}
+    return {variant: table.shape[1] for variant, table in tables.items()}
 
 
 def draw_clusters(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
-    """One point per run at each level, arms side by side; returns the number of runs of each arm.
+    """One point per run at each level, variants side by side; returns the number of runs of each variant.
 
     Raises:
-        MissingRunsError: no trained arm has a finished sweep.
+        MissingRunsError: no trained variant has a finished sweep.
     """
     tables = swept_runs(panel, study)
     levels = sorted({level for table in tables.values() for level in table.index})
-    trained = [arm for arm in tables if arm not in study.baselines]
-    styles = arm_styles(study.arms, study.baselines)
+    trained = [variant for variant in tables if variant not in study.baselines]
+    styles = variant_styles(study.variants, study.baselines)
     room = 0.8 / len(trained)
-    for arm, table in tables.items():
-        style, label = styles[arm], study.arms[arm]
+    for variant, table in tables.items():
+        style, label = styles[variant], study.variants[variant]
         places = np.array([levels.index(level) for level in table.index], dtype=np.float64)
-        if arm in study.baselines:
+        if variant in study.baselines:
             axes.hlines(table.mean(axis=1), places - 0.45, places + 0.45, color=style.colour, linestyle=style.line)
             axes.plot([], [], linestyle=style.line, color=style.colour, label=label)
         else:
-            places += (trained.index(arm) - (len(trained) - 1) / 2) * room
+            places += (trained.index(variant) - (len(trained) - 1) / 2) * room
             _draw_cluster(axes, places, table, style, label, room)
-    axes.plot([], [], color=_ANY_ARM, linewidth=2.4, label="bar: mean over runs")
+    axes.plot([], [], color=_ANY_VARIANT, linewidth=2.4, label="bar: mean over runs")
     _label(axes, panel, study)
     axes.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
     axes.set_xlim(-0.6, len(levels) - 0.4)
     axes.grid(visible=False, axis="x")
-    return {arm: table.shape[1] for arm, table in tables.items()}
+    return {variant: table.shape[1] for variant, table in tables.items()}
 
 
 def _draw_band(axes: Axes, table: pd.DataFrame, colour: str) -> None:
@@ -85,7 +85,7 @@ def _draw_band(axes: Axes, table: pd.DataFrame, colour: str) -> None:
 
 
 def _draw_cluster(
-    axes: Axes, places: NDArray[np.float64], table: pd.DataFrame, style: ArmStyle, label: str, room: float
+    axes: Axes, places: NDArray[np.float64], table: pd.DataFrame, style: VariantStyle, label: str, room: float
 ) -> None:
     """Runs stand from left to right in the order of their seeds, so that equal ones do not hide each other."""
     count = table.shape[1]
@@ -98,16 +98,16 @@ def _draw_cluster(
 
 
 def swept_runs(panel: Panel, study: Study) -> dict[str, pd.DataFrame]:
-    """What the runs of each arm earned: one row per level, one column per seed.
+    """What the runs of each variant earned: one row per level, one column per seed.
 
-    Arms without a row of the sweep are left out, as not every arm is swept.
+    Variants without a row of the sweep are left out, as not every variant is swept.
 
     Raises:
-        MissingRunsError: no trained arm is left.
+        MissingRunsError: no trained variant is left.
     """
-    tables = {arm: _table(panel, study.robustness(panel.condition, arm)) for arm in study.arms}
-    tables = {arm: table for arm, table in tables.items() if not table.empty}
-    if not any(arm in tables for arm in study.trained_arms):
+    tables = {variant: _table(panel, study.robustness(panel.condition, variant)) for variant in study.variants}
+    tables = {variant: table for variant, table in tables.items() if not table.empty}
+    if not any(variant in tables for variant in study.trained_variants):
         place = f"{study.experiment}, {panel.condition}, budget {study.budget}"
         raise MissingRunsError(f"{place}: no finished sweep of {panel.sweep}\n  {study.command}")
     return tables

@@ -32,14 +32,14 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True)
 class Summary:
-    """One arm beside the first one; figures that do not exist are NaN.
+    """One variant beside the first one; figures that do not exist are NaN.
 
     Attributes:
         runs: how many figures there are.
         mean, iqm: mean and interquartile mean over runs.
         interval: of the mean.
-        p: of `mann_whitney_p` against the first arm, corrected by `holm`.
-        a12: chance that a run of this arm beats one of the first.
+        p: of `mann_whitney_p` against the first variant, corrected by `holm`.
+        a12: chance that a run of this variant beats one of the first.
     """
 
     runs: int
@@ -156,24 +156,24 @@ def area(best_so_far: Figures) -> float:
 
 
 def compare(values: Mapping[str, Figures], untrained: Collection[str] = ()) -> dict[str, Summary]:
-    """One summary per arm; the first arm is what the others are compared with.
+    """One summary per variant; the first variant is what the others are compared with.
 
     Args:
-        values: arm -> one figure per run; may be empty.
-        untrained: arms without p: they are no competitors, so they must not cost the others power.
+        values: variant -> one figure per run; may be empty.
+        untrained: variants without p: they are no competitors, so they must not cost the others power.
     """
     first, reference = next(iter(values.items()), ("", ()))
-    tested = [arm for arm in values if arm != first and arm not in untrained]
-    corrected = holm([mann_whitney_p(values[arm], reference) for arm in tested])
+    tested = [variant for variant in values if variant != first and variant not in untrained]
+    corrected = holm([mann_whitney_p(values[variant], reference) for variant in tested])
     p_of = dict(zip(tested, corrected, strict=True))
     return {
-        arm: Summary(
+        variant: Summary(
             runs=len(figures),
             mean=mean(figures),
             iqm=interquartile_mean(figures),
             interval=bootstrap_interval(figures),
-            p=p_of.get(arm, math.nan),
-            a12=math.nan if arm == first else a12(figures, reference),
+            p=p_of.get(variant, math.nan),
+            a12=math.nan if variant == first else a12(figures, reference),
         )
-        for arm, figures in values.items()
+        for variant, figures in values.items()
     }

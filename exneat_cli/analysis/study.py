@@ -27,13 +27,13 @@ class PlannedRun:
     """One run of an experiment, finished or not.
 
     Attributes:
-        condition, arm, seed: its place in the experiment.
+        condition, variant, seed: its place in the experiment.
         directory: where its files are, or will be.
         generations: how long it is trained; None takes any length.
     """
 
     condition: str
-    arm: str
+    variant: str
     seed: int
     directory: RunDirectory
     generations: int | None = None
@@ -50,8 +50,8 @@ class Study:
         command: the command line that makes what is missing.
         fitness_name: what the task's fitness is, in words.
         has_full_reward: whether the task has a second figure.
-        arms: name -> label, in the order of legends; the first is what others are compared with.
-        baselines: names of those arms that nothing trains.
+        variants: name -> label, in the order of legends; the first is what others are compared with.
+        baselines: names of those variants that nothing trains.
         conditions: name -> label.
         sweeps: name of a robustness sweep -> label of its axis, with unit.
         runs: all of them.
@@ -65,7 +65,7 @@ class Study:
     command: str
     fitness_name: str
     has_full_reward: bool
-    arms: Mapping[str, str]
+    variants: Mapping[str, str]
     baselines: tuple[str, ...]
     conditions: Mapping[str, str]
     sweeps: Mapping[str, str]
@@ -74,45 +74,51 @@ class Study:
     sweep_episodes: int | None = None
 
     @property
-    def trained_arms(self) -> tuple[str, ...]:
-        """Names of the arms that learn."""
-        return tuple(name for name in self.arms if name not in self.baselines)
+    def trained_variants(self) -> tuple[str, ...]:
+        """Names of the variants that learn."""
+        return tuple(name for name in self.variants if name not in self.baselines)
 
     def only(self, trained: Collection[str]) -> Study:
-        """The same study with these trained arms alone, and its baselines."""
-        kept = {arm: label for arm, label in self.arms.items() if arm in trained or arm in self.baselines}
-        return replace(self, arms=kept, runs=tuple(run for run in self.runs if run.arm in kept))
+        """The same study with these trained variants alone, and its baselines."""
+        kept = {
+            variant: label
+            for variant, label in self.variants.items()
+            if variant in trained or variant in self.baselines
+        }
+        return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
 
     @functools.cached_property
     def finished(self) -> tuple[PlannedRun, ...]:
         """The runs that are done."""
         return tuple(run for run in self.runs if _is_finished(run))
 
-    def of(self, condition: str, arm: str) -> tuple[PlannedRun, ...]:
-        """Finished runs of one arm in one condition, in the order of their seeds."""
-        return tuple(run for run in self.finished if (run.condition, run.arm) == (condition, arm))
+    def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
+        """Finished runs of one variant in one condition, in the order of their seeds."""
+        return tuple(run for run in self.finished if (run.condition, run.variant) == (condition, variant))
 
-    def require(self, condition: str, arms: Iterable[str]) -> None:
-        """Check that every one of `arms` has a finished run in `condition`.
+    def require(self, condition: str, variants: Iterable[str]) -> None:
+        """Check that every one of `variants` has a finished run in `condition`.
 
         Raises:
             MissingRunsError: one has none.
         """
-        missing = [self.arms[arm] for arm in arms if not self.of(condition, arm)]
+        missing = [self.variants[variant] for variant in variants if not self.of(condition, variant)]
         if missing:
             what = f"{self.experiment}, {condition}, budget {self.budget}: no finished run of {', '.join(missing)}"
             raise MissingRunsError(f"{what}\n  {self.command}")
 
-    def history(self, condition: str, arm: str) -> pd.DataFrame:
+    def history(self, condition: str, variant: str) -> pd.DataFrame:
         """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
-        return _stacked([(run, read_csv(run.directory.history, HistoryRow._fields)) for run in self.of(condition, arm)])
+        return _stacked(
+            [(run, read_csv(run.directory.history, HistoryRow._fields)) for run in self.of(condition, variant)]
+        )
 
-    def robustness(self, condition: str, arm: str) -> pd.DataFrame:
+    def robustness(self, condition: str, variant: str) -> pd.DataFrame:
         """The planned rows of robustness.csv of all finished runs, with a column ``seed``; may be empty.
 
         Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
         """
-        runs = [run for run in self.of(condition, arm) if run.directory.robustness.exists()]
+        runs = [run for run in self.of(condition, variant) if run.directory.robustness.exists()]
         table = _stacked([(run, read_csv(run.directory.robustness, RobustnessRow._fields)) for run in runs])
         return table if table.empty else table[self._is_planned(table)].reset_index(drop=True)
 
@@ -126,10 +132,11 @@ class Study:
             planned &= pd.Series([key in wanted for key in keys], index=table.index)
         return planned
 
-    def results(self, condition: str, arm: str) -> pd.DataFrame:
+    def results(self, condition: str, variant: str) -> pd.DataFrame:
         """One row per finished run: seed, training (final best so far), validation, test, full_reward."""
         rows = [
-            {"seed": run.seed, **_result(run.directory.read_manifest()["result"])} for run in self.of(condition, arm)
+            {"seed": run.seed, **_result(run.directory.read_manifest()["result"])}
+            for run in self.of(condition, variant)
         ]
         return pd.DataFrame(rows, columns=["seed", "training", "validation", "test", "full_reward"])
 

@@ -17,7 +17,20 @@ from exneat_cli.analysis.table_files import decimals_for, figure_cell, interval_
 from exneat_cli.errors import ExneatError
 
 _NAN = math.nan
-_CSV = ("condition", "arm", "quantity", "published", "mean", "low", "high", "iqm", "best_5", "runs", "p_holm", "a12")
+_CSV = (
+    "condition",
+    "variant",
+    "quantity",
+    "published",
+    "mean",
+    "low",
+    "high",
+    "iqm",
+    "best_5",
+    "runs",
+    "p_holm",
+    "a12",
+)
 _NOTHING = Summary(0, _NAN, _NAN, Interval(_NAN, _NAN), _NAN, _NAN)
 
 
@@ -26,7 +39,7 @@ class _Line:
     """One row and column of the plan; `efficiency` is empty but for lines of efficiency, which have no summary."""
 
     condition: str
-    arm: str
+    variant: str
     quantity: str
     published: str
     runs: int = 0
@@ -39,12 +52,12 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     """Write one table of the catalogue as ``<name>.csv`` and ``<name>.md``: one line per row and column of the plan.
 
     Args:
-        plan: which arms and quantities.
+        plan: which variants and quantities.
         studies: by the name of their experiment.
         directory: where the files go; made if need be.
 
     Raises:
-        MissingRunsError: an arm of the table, or the arm that it is compared with, lacks runs or a level of a sweep.
+        MissingRunsError: a variant of the table, or the one that it is compared with, lacks runs or a level.
         ExneatError: the plan names something unknown, or a file cannot be written.
     """
     _check(plan, studies)
@@ -73,7 +86,7 @@ def _check(plan: TablePlan, studies: Mapping[str, Study]) -> None:
         if study is None:
             raise ExneatError(f"{plan.name}: expected an experiment of {', '.join(studies)}, got {row.experiment!r}")
         _check_known(f"{plan.name}: {row.experiment}", "condition", row.condition, study.conditions)
-        _check_known(f"{plan.name}: {row.experiment}", "arm", row.arm, study.arms)
+        _check_known(f"{plan.name}: {row.experiment}", "variant", row.variant, study.variants)
         for column_name in row.published:
             _check_known(f"{plan.name}: published", "column", column_name, plan.columns)
 
@@ -86,11 +99,11 @@ def _check_known(where: str, what: str, name: str, known: Mapping[str, object]) 
 def _require(plan: TablePlan, studies: Mapping[str, Study]) -> None:
     for experiment, condition in _places(plan):
         study = studies[experiment]
-        arms = [row.arm for row in plan.rows if (row.experiment, row.condition) == (experiment, condition)]
-        study.require(condition, dict.fromkeys((next(iter(study.arms)), *arms)))
+        variants = [row.variant for row in plan.rows if (row.experiment, row.condition) == (experiment, condition)]
+        study.require(condition, dict.fromkeys((next(iter(study.variants)), *variants)))
         for column in plan.columns.values():
             if column.of == "robustness":
-                require_level(study, condition, arms, column)
+                require_level(study, condition, variants, column)
 
 
 def _places(plan: TablePlan) -> list[tuple[str, str]]:
@@ -100,31 +113,35 @@ def _places(plan: TablePlan) -> list[tuple[str, str]]:
 
 def _lines(plan: TablePlan, studies: Mapping[str, Study]) -> Iterator[_Line]:
     values = {
-        (*place, name): {arm: per_run(studies[place[0]], place[1], arm, column) for arm in studies[place[0]].arms}
+        (*place, name): {
+            variant: per_run(studies[place[0]], place[1], variant, column) for variant in studies[place[0]].variants
+        }
         for place in _places(plan)
         for name, column in plan.columns.items()
         if column.of != "efficiency"
     }
     summaries = {
-        key: compare({arm: list(runs.values()) for arm, runs in arms.items()}, studies[key[0]].baselines)
-        for key, arms in values.items()
+        key: compare({variant: list(runs.values()) for variant, runs in variants.items()}, studies[key[0]].baselines)
+        for key, variants in values.items()
     }
     for row in plan.rows:
         study = studies[row.experiment]
         for name, column in plan.columns.items():
-            line = _Line(study.conditions[row.condition], study.arms[row.arm], name, str(row.published.get(name, "")))
+            line = _Line(
+                study.conditions[row.condition], study.variants[row.variant], name, str(row.published.get(name, ""))
+            )
             key = (row.experiment, row.condition, name)
             if column.of == "efficiency":
-                runs = len(study.of(row.condition, row.arm))
-                yield replace(line, runs=runs, efficiency=efficiency_of(study, row.condition, row.arm))
+                runs = len(study.of(row.condition, row.variant))
+                yield replace(line, runs=runs, efficiency=efficiency_of(study, row.condition, row.variant))
             else:
-                best = _mean_of_best(study, row, values[key][row.arm]) if column.of == "robustness" else _NAN
-                summary = summaries[key][row.arm]
+                best = _mean_of_best(study, row, values[key][row.variant]) if column.of == "robustness" else _NAN
+                summary = summaries[key][row.variant]
                 yield replace(line, runs=summary.runs, summary=summary, best=best)
 
 
 def _mean_of_best(study: Study, row: TableRow, by_seed: Mapping[int, float]) -> float:
-    seeds = [seed for seed in best_on_validation(study, row.condition, row.arm) if seed in by_seed]
+    seeds = [seed for seed in best_on_validation(study, row.condition, row.variant) if seed in by_seed]
     return mean([by_seed[seed] for seed in seeds[:BEST]])
 
 
@@ -141,7 +158,7 @@ def _has_robustness(plan: TablePlan) -> bool:
 def _header(plan: TablePlan) -> tuple[str, ...]:
     best = (f"ours, best {BEST}",) if _has_robustness(plan) else ()
     figures = ("published", "ours (mean)", "95% interval", "IQM", *best)
-    return ("condition", "arm", "quantity", *figures, "runs", "p (Holm)", "A12")
+    return ("condition", "variant", "quantity", *figures, "runs", "p (Holm)", "A12")
 
 
 def _cells(plan: TablePlan, line: _Line, decimals: int) -> tuple[str, ...]:
@@ -150,13 +167,13 @@ def _cells(plan: TablePlan, line: _Line, decimals: int) -> tuple[str, ...]:
     ours = line.efficiency or figure_cell(summary.mean, decimals)
     figures = (line.published, ours, interval_cell(summary.interval, decimals), figure_cell(summary.iqm, decimals))
     verdict = (str(line.runs), p_cell(summary.p), figure_cell(summary.a12, 2))
-    return (line.condition, line.arm, line.quantity, *figures, *best, *verdict)
+    return (line.condition, line.variant, line.quantity, *figures, *best, *verdict)
 
 
 def _exact(line: _Line) -> tuple[object, ...]:
     summary = line.summary
     figures = (line.efficiency or summary.mean, *summary.interval, summary.iqm, line.best)
-    place = (line.condition, line.arm, line.quantity, line.published)
+    place = (line.condition, line.variant, line.quantity, line.published)
     return (*place, *figures, line.runs, summary.p, summary.a12)
 
 
@@ -166,8 +183,8 @@ def _sentences(plan: TablePlan, studies: Mapping[str, Study], fewest: int) -> It
         study = studies[experiment]
         rows = [row for row in plan.rows if row.experiment == experiment]
         conditions = list(dict.fromkeys(row.condition for row in rows))
-        arms = list(dict.fromkeys(row.arm for row in rows))
-        yield captions.runs_sentence(study, conditions, arms)
+        variants = list(dict.fromkeys(row.variant for row in rows))
+        yield captions.runs_sentence(study, conditions, variants)
         if study.budget != "paper" and any(row.published for row in rows):
             yield "The published figures rest on a larger budget."
         yield captions.quantity_sentence(study, quantities)
@@ -177,7 +194,7 @@ def _sentences(plan: TablePlan, studies: Mapping[str, Study], fewest: int) -> It
         if "efficiency" in quantities:
             yield captions.efficiency_sentence(study)
             yield "Published efficiencies are not exactly comparable."
-        yield captions.budgets_sentence(study, conditions, arms)
+        yield captions.budgets_sentence(study, conditions, variants)
     if _has_robustness(plan):
         yield f"Best {BEST}: mean over the {BEST} runs that are best on validation, or all if there are fewer."
     yield plan.note

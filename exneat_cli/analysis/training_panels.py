@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter, MaxNLocator
 from numpy.typing import NDArray
 
-from exneat_cli.analysis.arm_styles import ArmStyle, arm_styles
 from exneat_cli.analysis.catalogue import Panel
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import Study
+from exneat_cli.analysis.variant_styles import VariantStyle, variant_styles
 
 AXIS_LABELS = {
     "generation": "generation",
@@ -27,7 +27,7 @@ MARKERS_PER_CURVE = 8
 
 
 class Curves(NamedTuple):
-    """Best fitness so far of the runs of one arm.
+    """Best fitness so far of the runs of one variant.
 
     Attributes:
         x: (P,) places on the horizontal axis that every run has reached and none has passed.
@@ -39,7 +39,7 @@ class Curves(NamedTuple):
 
 
 def common_curves(history: pd.DataFrame, axis: str) -> Curves:
-    """The curves of one arm's runs at common places.
+    """The curves of one variant's runs at common places.
 
     Runs spend different numbers of control steps per generation. Between two generations a run keeps the
     value of the earlier one, which is what it had then.
@@ -61,34 +61,34 @@ def common_curves(history: pd.DataFrame, axis: str) -> Curves:
 
 
 def draw_means(axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
-    """Each arm's mean over runs with its 95% band; returns the number of runs of each arm.
+    """Each variant's mean over runs with its 95% band; returns the number of runs of each variant.
 
     Raises:
-        MissingRunsError: an arm has no finished run.
+        MissingRunsError: a variant has no finished run.
     """
     counts = {}
-    for arm, style, curves in _curves_of_arms(panel, study, axis):
+    for variant, style, curves in _curves_of_variants(panel, study, axis):
         band = np.array([bootstrap_interval(column) for column in curves.values.T])
         if not np.isnan(band).all():
             axes.fill_between(curves.x, band[:, 0], band[:, 1], color=style.colour, alpha=0.18, linewidth=0.0)
-        _draw_mean(axes, curves, style, study.arms[arm])
-        counts[arm] = len(curves.values)
+        _draw_mean(axes, curves, style, study.variants[variant])
+        counts[variant] = len(curves.values)
     _label(axes, study, axis)
     return counts
 
 
 def draw_each_run(axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
-    """Each run as a thin line, each arm's mean as a thick one; returns the number of runs of each arm.
+    """Each run as a thin line, each variant's mean as a thick one; returns the number of runs of each variant.
 
     Raises:
-        MissingRunsError: an arm has no finished run.
+        MissingRunsError: a variant has no finished run.
     """
     counts = {}
-    for arm, style, curves in _curves_of_arms(panel, study, axis):
-        for _, run in study.history(panel.condition, arm).groupby("seed"):
+    for variant, style, curves in _curves_of_variants(panel, study, axis):
+        for _, run in study.history(panel.condition, variant).groupby("seed"):
             axes.plot(run[axis], run["best_so_far"], color=style.colour, linewidth=0.6, alpha=0.55, zorder=1)
-        _draw_mean(axes, curves, style, study.arms[arm], width=2.6)
-        counts[arm] = len(curves.values)
+        _draw_mean(axes, curves, style, study.variants[variant], width=2.6)
+        counts[variant] = len(curves.values)
     _label(axes, study, axis)
     return counts
 
@@ -97,34 +97,43 @@ def draw_areas(axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, i
     """The mean over generations of each run's best so far, one point per run; returns the numbers of runs.
 
     Raises:
-        MissingRunsError: an arm has no finished run.
+        MissingRunsError: a variant has no finished run.
     """
-    study.require(panel.condition, study.trained_arms)
-    styles = arm_styles(study.arms, study.baselines)
+    study.require(panel.condition, study.trained_variants)
+    styles = variant_styles(study.variants, study.baselines)
     counts = {}
-    for place, arm in enumerate(study.trained_arms):
-        history = study.history(panel.condition, arm)
+    for place, variant in enumerate(study.trained_variants):
+        history = study.history(panel.condition, variant)
         areas = history.groupby("seed")["best_so_far"].mean().to_numpy()
         offsets = np.linspace(-0.2, 0.2, len(areas)) if len(areas) > 1 else np.zeros(1)
-        style = styles[arm]
+        style = styles[variant]
         axes.scatter(
-            place + offsets, areas, s=26, marker=style.marker, color=style.colour, alpha=0.75, label=study.arms[arm]
+            place + offsets,
+            areas,
+            s=26,
+            marker=style.marker,
+            color=style.colour,
+            alpha=0.75,
+            label=study.variants[variant],
         )
         axes.hlines(areas.mean(), place - 0.32, place + 0.32, color=style.colour, linewidth=3.0)
-        counts[arm] = len(areas)
+        counts[variant] = len(areas)
     axes.plot([], [], color="#444444", linewidth=3.0, label="bar: mean over runs")
-    axes.set(xticks=[], xlabel="arm", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
+    axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
     axes.margins(x=0.08)
     return counts
 
 
-def _curves_of_arms(panel: Panel, study: Study, axis: str) -> list[tuple[str, ArmStyle, Curves]]:
-    study.require(panel.condition, study.trained_arms)
-    styles = arm_styles(study.arms, study.baselines)
-    return [(arm, styles[arm], common_curves(study.history(panel.condition, arm), axis)) for arm in study.trained_arms]
+def _curves_of_variants(panel: Panel, study: Study, axis: str) -> list[tuple[str, VariantStyle, Curves]]:
+    study.require(panel.condition, study.trained_variants)
+    styles = variant_styles(study.variants, study.baselines)
+    return [
+        (variant, styles[variant], common_curves(study.history(panel.condition, variant), axis))
+        for variant in study.trained_variants
+    ]
 
 
-def _draw_mean(axes: Axes, curves: Curves, style: ArmStyle, label: str, width: float = 1.8) -> None:
+def _draw_mean(axes: Axes, curves: Curves, style: VariantStyle, label: str, width: float = 1.8) -> None:
     every = max(1, len(curves.x) // MARKERS_PER_CURVE)
     axes.plot(curves.x, curves.values.mean(axis=0), linewidth=width, markevery=every, label=label, **style.mean)
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from exneat_cli.algorithms import ArrayGenome
+from exneat_cli.algorithms.neat.structure import row_of
 from exneat_cli.brains.brain import Brain, Brains
 from exneat_cli.brains.expression import express
 from exneat_cli.brains.wiring_arrays import WiringArrays, wiring_arrays
-from exneat_cli.evolution import ArrayGenome
-from exneat_cli.evolution.structure import row_of
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
 

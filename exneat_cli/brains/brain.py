@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.compiling import compiled_lean
+from exneat_cli.compiling import compiled_lean
 
 
 class Brain(NamedTuple):
@@ -29,7 +29,7 @@ class Brain(NamedTuple):
         edge_source: (E,) slot that each edge reads.
         edge_weight: (E,) its weight.
         bias, response: (N,) a node's value is act(bias + response * sum).
-        activation: (N,) indices into `exneat_cli.evolution.ACTIVATIONS`.
+        activation: (N,) indices into `exneat_cli.algorithms.ACTIVATIONS`.
         link_slot, link_source: (L,) at each step's start the source's old value is copied to the slot.
         output_slot: (A,) slot that sets each actuator.
     """

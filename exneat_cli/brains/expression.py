@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exneat_cli.algorithms import ArrayGenome
+from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, Connections, Nodes, end_to_end
+from exneat_cli.algorithms.neat.structure import mark_sources, node_row
 from exneat_cli.brains.wiring_arrays import WiringArrays
-from exneat_cli.evolution import ArrayGenome
-from exneat_cli.evolution.genes import CONNECTION, NODE, Connections, Nodes, end_to_end
-from exneat_cli.evolution.structure import mark_sources, node_row
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.compiling import compiled
 
 
 class Networks(NamedTuple):

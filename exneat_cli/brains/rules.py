@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains.brain import Brain
-from exneat_cli.evolution import ACTIVATIONS
-from exneat_cli.tasks import Sector
+from exneat_cli.tasks import Part
 
 
 class RandomActions(NamedTuple):
@@ -25,14 +25,14 @@ def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Br
     return weighted_sums(np.zeros((len(resting_action), observation_size)), resting_action)
 
 
-def linear_fusion(observation_size: int, action_size: int, sectors: Sequence[Sector]) -> Brain:
+def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]) -> Brain:
     """Moves to where the sum of all channels is largest.
 
-    Each sector's actuators get the sum of its sensors, all others 0.
+    Each part's actuators get the sum of its sensors, all others 0.
     """
     weights = np.zeros((action_size, observation_size))
-    for sector in sectors:
-        weights[np.ix_(sector.actuators, sector.sensors)] = 1.0
+    for part in parts:
+        weights[np.ix_(part.actuators, part.sensors)] = 1.0
     return weighted_sums(weights, np.zeros(action_size))
 
 

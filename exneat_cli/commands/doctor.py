@@ -51,7 +51,7 @@ def _all_findings(output: Path) -> Iterator[Finding]:
 
 def _conclusion(states: Counter[str]) -> str:
     if states[BROKEN]:
-        return "this machine is not fit for exneat until what is broken is mended."
+        return "this machine is not fit for exneat until what is broken is fixed."
     return "this machine is fit for exneat."
 
 
@@ -95,7 +95,7 @@ def _memory() -> Iterable[Finding]:
 
 
 def _physics() -> Iterable[Finding]:
-    from exneat_cli.tasks import simulator_trial
+    from exneat_cli.tasks.robots import simulator_trial
 
     name = "compiled MuJoCo"
     try:
@@ -115,7 +115,7 @@ def _physics() -> Iterable[Finding]:
 
 
 def _rendering() -> Iterable[Finding]:
-    from exneat_cli.tasks import simulator_trial
+    from exneat_cli.tasks.robots import simulator_trial
 
     try:
         backend = simulator_trial.try_rendering()
@@ -129,8 +129,8 @@ def _rendering() -> Iterable[Finding]:
 
 
 def _cache() -> Iterable[Finding]:
+    from exneat_cli.compiling import cache_directory, cache_root
     from exneat_cli.records import disk
-    from exneat_cli.tasks.compiling import cache_directory, cache_root
 
     directory = cache_directory()
     try:

@@ -1,4 +1,4 @@
-"""Experiments: arms x conditions x seeds, from a YAML file to the settings of every run."""
+"""Experiments: variants x conditions x seeds, from a YAML file to the settings of every run."""
 
 from __future__ import annotations
 
@@ -19,14 +19,20 @@ from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_whol
 from exneat_cli.records import read_yaml
 from exneat_cli.runs import RunSettings, check_sweeps, is_finished
 
-_FIELDS = {"claim": (str,), "settings": (Mapping,), "arms": (Mapping,), "conditions": (Mapping,), "runs": (Mapping,)}
+_FIELDS = {
+    "claim": (str,),
+    "settings": (Mapping,),
+    "variants": (Mapping,),
+    "conditions": (Mapping,),
+    "runs": (Mapping,),
+}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
 _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "hydra"}
-"""What the launcher sets itself, so that no arm or condition may."""
+"""What the launcher sets itself, so that no variant or condition may."""
 
 
 @dataclass(frozen=True)
-class Arm:
+class Variant:
     """One of the things compared.
 
     Attributes:
@@ -59,15 +65,15 @@ class Experiment:
         name: of the file.
         claim: what it is to show.
         settings: overrides for all of its runs.
-        arms: by name; the others are compared with the first.
+        variants: by name; the others are compared with the first.
         conditions: by name.
-        runs: budget -> number of seeds of each arm, 0, 1, 2, ...
+        runs: budget -> number of seeds of each variant, 0, 1, 2, ...
     """
 
     name: str
     claim: str
     settings: Mapping[str, Any]
-    arms: Mapping[str, Arm]
+    variants: Mapping[str, Variant]
     conditions: Mapping[str, Condition]
     runs: Mapping[str, int]
 
@@ -77,14 +83,14 @@ class Job:
     """One run of an experiment: where it stands, its settings, and its robustness sweeps."""
 
     condition: str
-    arm: str
+    variant: str
     settings: RunSettings
     sweeps: Sweeps
 
     @property
     def name(self) -> str:
         """The job in one word, e.g. ``noise_0.05/neat/3``."""
-        return f"{self.condition}/{self.arm}/{self.settings.seed}"
+        return f"{self.condition}/{self.variant}/{self.settings.seed}"
 
     def is_finished(self) -> bool:
         """Whether the run is done and was tested at every level; a damaged one is not."""
@@ -145,11 +151,11 @@ def _known(key: str, values: object, fields: Mapping[str, tuple[type, ...]]) -> 
 
 
 def _experiment(name: str, content: Mapping[str, Any]) -> Experiment:
-    arms, conditions = content["arms"], content["conditions"]
-    for part, entries in (("arms", arms), ("conditions", conditions)):
+    variants, conditions = content["variants"], content["conditions"]
+    for part, entries in (("variants", variants), ("conditions", conditions)):
         if not entries:
             raise ConfigError(part, "at least one entry", entries)
-    for key in (name, *arms, *conditions):
+    for key in (name, *variants, *conditions):
         if not isinstance(key, str) or not _NAME.fullmatch(key):
             raise ConfigError("name", "at most 40 letters, digits, '.', '_' and '-'", key)
     if not content["runs"]:
@@ -161,18 +167,18 @@ def _experiment(name: str, content: Mapping[str, Any]) -> Experiment:
         name=name,
         claim=content["claim"],
         settings=_overrides("settings", content["settings"]),
-        arms={key: _arm(f"arms.{key}", entry) for key, entry in arms.items()},
+        variants={key: _variant(f"variants.{key}", entry) for key, entry in variants.items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in conditions.items()},
         runs=dict(content["runs"]),
     )
 
 
-def _arm(key: str, entry: object) -> Arm:
+def _variant(key: str, entry: object) -> Variant:
     fields = {"label": (str,), "settings": (Mapping,), "runs": (int, type(None)), "swept": (bool, type(None))}
     values = _known(key, entry, fields)
     if values.get("runs") is not None:
         check_whole(f"{key}.runs", values["runs"], 1, 10_000)
-    return Arm(**{**values, "settings": _overrides(f"{key}.settings", values["settings"])})
+    return Variant(**{**values, "settings": _overrides(f"{key}.settings", values["settings"])})
 
 
 def _condition(key: str, entry: object) -> Condition:
@@ -201,7 +207,7 @@ def _overrides(key: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()) -> list[Job]:
-    """Every run of an experiment, condition by condition and arm by arm.
+    """Every run of an experiment, condition by condition and variant by variant.
 
     Args:
         experiment: what is compared.
@@ -216,28 +222,28 @@ def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()
     jobs: list[Job] = []
     with composing() as compose:
         for condition in experiment.conditions:
-            for arm in experiment.arms:
+            for variant in experiment.variants:
                 try:
-                    jobs += _jobs(experiment, condition, arm, budget, overrides, compose)
+                    jobs += _jobs(experiment, condition, variant, budget, overrides, compose)
                 except ExneatError as error:
-                    raise ExneatError(f"{experiment.name}, {condition}, {arm}: {error}") from error
+                    raise ExneatError(f"{experiment.name}, {condition}, {variant}: {error}") from error
     places: dict[Path, Job] = {}
     for job in jobs:
         twin = places.setdefault(job.settings.directory.path, job)
         if twin is not job:
-            raise ExneatError(f"{experiment.name}: {twin.name} and {job.name} are the same run; arms must differ")
+            raise ExneatError(f"{experiment.name}: {twin.name} and {job.name} are the same run; variants must differ")
     return jobs
 
 
 def _jobs(
     experiment: Experiment,
     condition: str,
-    arm: str,
+    variant: str,
     budget: str,
     overrides: Sequence[str],
     compose: Callable[[Sequence[str]], DictConfig],
 ) -> Iterable[Job]:
-    chosen, where = experiment.arms[arm], experiment.conditions[condition]
+    chosen, where = experiment.variants[variant], experiment.conditions[condition]
     sweeps = f"[{','.join(where.sweeps)}]" if where.sweeps and chosen.swept else "none"
     settings = {**experiment.settings, **where.settings, **chosen.settings}
     config = compose(
@@ -253,7 +259,7 @@ def _jobs(
     asked = sweeps_from(config, first.task.name)
     check_sweeps(first, asked.sweeps, asked.episodes)
     seeds = range(chosen.runs or experiment.runs[budget])
-    return [Job(condition, arm, dataclasses.replace(first, seed=first.seed + k), asked) for k in seeds]
+    return [Job(condition, variant, dataclasses.replace(first, seed=first.seed + k), asked) for k in seeds]
 
 
 def budget_of(overrides: Sequence[str]) -> tuple[str | None, list[str]]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from exneat_cli.errors import ExneatError
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
-"""Fit; works, but slower or with something missing; must be mended before exneat runs."""
+"""Fit; works, but slower or with something missing; must be fixed before exneat runs."""
 
 _NAME_WIDTH = 16
 
@@ -20,7 +20,7 @@ class Finding(NamedTuple):
         state: `OK`, `DEGRADED` or `BROKEN`.
         name: what was looked at, in a word or two.
         found: what was seen.
-        remedy: how to mend it; empty if there is nothing to mend.
+        remedy: how to fix it; empty if there is nothing to fix.
     """
 
     state: str
@@ -59,4 +59,4 @@ def in_words(error: BaseException) -> str:
 def _remedy_of(error: Exception) -> str:
     if isinstance(error, ImportError):
         return "install what is missing, then ask again"
-    return "the check itself failed; mend what it names, or report it with this line"
+    return "the check itself failed; fix what it names, or report it with this line"

@@ -35,13 +35,13 @@ def _show(run: RunDirectory) -> None:
         raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
     manifest = run.read_manifest()
     if not run.champion.exists():
-        why = "a baseline has no networks" if manifest.get("arm") in UNTRAINED else "it is not finished"
+        why = "a baseline has no networks" if manifest.get("variant") in UNTRAINED else "it is not finished"
         raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
     champion = read_champion(run.champion)
     print(f"{run.path}  ({_status(run, manifest)})")
     kind = "feed-forward" if champion.feed_forward else "recurrent"
     subpopulations = len(champion.plan.subpopulation_shapes)
-    print(f"{champion.arm}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
+    print(f"{champion.variant}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
     for module in champion.plan.modules:
         _show_module(champion, module)
     test = champion.scores["test"]

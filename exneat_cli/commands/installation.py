@@ -56,8 +56,8 @@ def loading() -> Iterator[Finding]:
 def _loading_remedy() -> str:
     backend = os.environ.get("MUJOCO_GL")
     if backend:
-        return f"mend the libraries above, or unset MUJOCO_GL ({backend}), which MuJoCo may be unable to serve"
-    return "mend the libraries above; if they are ok, install them anew with pip install --force-reinstall"
+        return f"fix the libraries above, or unset MUJOCO_GL ({backend}), which MuJoCo may be unable to serve"
+    return "fix the libraries above; if they are ok, install them anew with pip install --force-reinstall"
 
 
 def _python() -> Iterator[Finding]:

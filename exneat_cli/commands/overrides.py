@@ -50,7 +50,7 @@ def check_overrides(overrides: Sequence[str], conf: Path) -> None:
             raise ExneatError(f"{_short(text)}: expected key=value, got something nested too deeply") from error
         except Exception as error:
             reason = _short(str(error).splitlines()[0])
-            raise ExneatError(f"{_short(text)}: expected key=value: {reason}\n  {_mend(text)}") from error
+            raise ExneatError(f"{_short(text)}: expected key=value: {reason}\n  {_fix(text)}") from error
         _check(text, override, conf)
         jobs *= _values(override)
         if not jobs <= _MOST_JOBS:
@@ -87,8 +87,8 @@ def _check_hydras(text: str, name: str) -> None:
         raise ExneatError(f"{_short(text)}: unknown key; below hydra. there are {', '.join(sorted(known))}")
     for taken in _SET_HERE:
         if name == taken or name.startswith(f"{taken}."):
-            mend = "output= says where runs go, --config-dir where your own files are"
-            raise ExneatError(f"{_short(text)}: exneat sets hydra.{taken} itself\n  {mend}")
+            fix = "output= says where runs go, --config-dir where your own files are"
+            raise ExneatError(f"{_short(text)}: exneat sets hydra.{taken} itself\n  {fix}")
 
 
 def _check_choice_of_option(group: str, value: object) -> None:
@@ -102,7 +102,7 @@ def _check_choice_of_option(group: str, value: object) -> None:
             raise ConfigError(group, "the name of an option", value, "--config-dir adds a directory of your own")
 
 
-def _mend(text: str) -> str:
+def _fix(text: str) -> str:
     if any(character in text for character in "{}[](),'\":~\\") or not text.isascii():
         return "values with brackets, quotes or other special characters need quotes of their own: \"key='value'\""
     return "e.g. seed=3"

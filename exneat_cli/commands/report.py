@@ -134,7 +134,7 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
 
 def _planned(job: Job) -> PlannedRun:
     settings = job.settings
-    return PlannedRun(job.condition, job.arm, settings.seed, settings.directory, settings.trained_generations)
+    return PlannedRun(job.condition, job.variant, settings.seed, settings.directory, settings.trained_generations)
 
 
 def _study(experiment: Experiment, request: Request) -> Study:
@@ -156,8 +156,8 @@ def _study(experiment: Experiment, request: Request) -> Study:
         command=" ".join(["exneat sweep", f"experiment={name}", f"budget={budget}", *extra, *request.overrides]),
         fitness_name=task.fitness_name,
         has_full_reward=task.has_full_reward,
-        arms={name: arm.label for name, arm in experiment.arms.items()},
-        baselines=tuple(dict.fromkeys(job.arm for job in jobs if job.settings.algorithm in UNTRAINED)),
+        variants={name: variant.label for name, variant in experiment.variants.items()},
+        baselines=tuple(dict.fromkeys(job.variant for job in jobs if job.settings.algorithm in UNTRAINED)),
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps=labels,
         runs=tuple(_planned(job) for job in jobs),

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from exneat_cli.algorithms import ArrayGenome, Entry, genome_from_data, genome_to_data
 from exneat_cli.brains import Brain, assemble
-from exneat_cli.evolution import ArrayGenome, Entry, genome_from_data, genome_to_data
 from exneat_cli.records.champion_data import FORMAT, plan_from_data, read_champion_data
 from exneat_cli.records.files import write_json, write_whole
 from exneat_cli.wiring import Plan
@@ -20,7 +20,7 @@ class Champion:
     """The team that a run hands over.
 
     Attributes:
-        arm: what was trained, e.g. ``exneat-all-none``.
+        variant: what was trained, e.g. ``exneat-all-none``.
         task: the task's parameters.
         actuators: names of the entries of the action.
         feed_forward: the kind of networks.
@@ -29,7 +29,7 @@ class Champion:
         scores: training, validation and test figures.
     """
 
-    arm: str
+    variant: str
     task: dict[str, Any]
     actuators: tuple[str, ...]
     feed_forward: bool
@@ -50,7 +50,7 @@ def write_champion(path: Path, champion: Champion) -> None:
     """
     content = {
         "format": FORMAT,
-        "arm": champion.arm,
+        "variant": champion.variant,
         "task": champion.task,
         "actuators": champion.actuators,
         "feed_forward": champion.feed_forward,
@@ -69,7 +69,7 @@ def read_champion(path: Path) -> Champion:
     """
     content = read_champion_data(path)
     return Champion(
-        arm=content["arm"],
+        variant=content["variant"],
         task=content["task"],
         actuators=tuple(content["actuators"]),
         feed_forward=content["feed_forward"],

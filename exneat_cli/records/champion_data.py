@@ -6,15 +6,15 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_real, check_whole, shortened
-from exneat_cli.evolution.genes import ACTIVATIONS
 from exneat_cli.records.files import read_json
 from exneat_cli.wiring import Module, Pin, Plan
 
 FORMAT = 1
 _LARGEST = 1_000_000
 _LARGEST_ID = 2**62
-_FIELDS = ("format", "arm", "task", "actuators", "feed_forward", "scores", "plan", "genomes")
+_FIELDS = ("format", "variant", "task", "actuators", "feed_forward", "scores", "plan", "genomes")
 _MODULE = ("name", "position", "subpopulation", "pins", "outputs", "hidden", "drives")
 _SCORES = {
     "training": ("fitness",),
@@ -35,7 +35,7 @@ def read_champion_data(path: Path) -> dict[str, Any]:
         raise ExneatError(f"{path}: expected a champion of format {FORMAT}, got {shortened(kind)}")
     try:
         _check_fields("", content, _FIELDS)
-        _check_word("arm", content["arm"])
+        _check_word("variant", content["variant"])
         _check_words("actuators", content["actuators"])
         check_flag("feed_forward", content["feed_forward"])
         _check_task(content["task"])

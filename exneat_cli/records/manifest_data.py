@@ -13,7 +13,7 @@ RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
 STATUSES = (RUNNING, DONE, FAILED, INTERRUPTED)
 """What a manifest's status can be."""
 _WHOLE = ("format", "generations", "process", "seed")
-_WORDS = ("arm", "task", "configuration_hash", "started", "finished")
+_WORDS = ("variant", "task", "configuration_hash", "started", "finished")
 _FIGURES = ("fitness_mean", "fitness_std", "full_reward_mean")
 
 

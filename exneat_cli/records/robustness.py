@@ -19,7 +19,7 @@ class RobustnessRow(NamedTuple):
     """How a champion or a baseline did at one level.
 
     Attributes:
-        arm, run_seed: whose run it is.
+        variant, run_seed: whose run it is.
         parameter: name of the sweep, e.g. ``sensor_noise``; or `UNPERTURBED`.
         level: of the swept setting, in its unit.
         episodes: how many were run.
@@ -27,7 +27,7 @@ class RobustnessRow(NamedTuple):
         full_reward_mean, full_reward_std: the same of the task's second figure.
     """
 
-    arm: str
+    variant: str
     run_seed: int
     parameter: str
     level: float
@@ -57,11 +57,11 @@ def read_robustness(path: Path) -> list[RobustnessRow]:
 
 
 def _row(values: Sequence[str]) -> RobustnessRow:
-    arm, seed, parameter, level, episodes, *figures = values
+    variant, seed, parameter, level, episodes, *figures = values
     numbers = [float(figure) for figure in figures]
     if not all(math.isfinite(number) for number in (float(level), *numbers)):
         raise ValueError(f"a number is not finite in the row of {parameter} {level}")
-    return RobustnessRow(arm, int(seed), parameter, float(level), int(episodes), *numbers)
+    return RobustnessRow(variant, int(seed), parameter, float(level), int(episodes), *numbers)
 
 
 def merge_robustness(path: Path, rows: Sequence[RobustnessRow]) -> None:

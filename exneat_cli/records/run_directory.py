@@ -39,7 +39,7 @@ def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = Tr
 
     Args:
         configuration: all settings of a run, as plain data.
-        with_seed: without it, the seeds of one arm share a hash.
+        with_seed: without it, the seeds of one variant share a hash.
     """
     kept = _that_matter(configuration, _NOT_HASHED if with_seed else (*_NOT_HASHED, "seed"))
     return hashlib.sha256(json.dumps(kept, sort_keys=True, allow_nan=False).encode()).hexdigest()
@@ -170,12 +170,12 @@ class RunDirectory:
                 "  remove it, or set name= or output= to another place"
             )
         manifest = self.read_manifest()
-        mend = "  remove it, or set name= or output= to another place"
+        fix = "  remove it, or set name= or output= to another place"
         if manifest.get("format") != MANIFEST_FORMAT:
             came = f"holds a run of format {manifest.get('format')!r}, expected {MANIFEST_FORMAT}"
-            raise ExneatError(f"{self.path}: {came}\n{mend}")
+            raise ExneatError(f"{self.path}: {came}\n{fix}")
         if manifest.get("configuration_hash") != full_hash:
-            raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{mend}")
+            raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{fix}")
         status, there, asked = manifest.get("status"), manifest.get("generations"), configuration["generations"]
         if status == DONE and there == asked:
             return Claim.FINISHED

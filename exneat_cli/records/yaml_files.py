@@ -73,8 +73,8 @@ def _syntax(path: Path, error: yaml.YAMLError) -> str:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     place = f"{path}:{mark.line + 1}" if mark else str(path)
     problem = getattr(error, "problem", None) or " ".join(str(error).split())
-    mend = "\n  indent with spaces" if "'\\t'" in problem else ""
-    return f"{place}: expected YAML, got something else: {problem}{mend}"
+    fix = "\n  indent with spaces" if "'\\t'" in problem else ""
+    return f"{place}: expected YAML, got something else: {problem}{fix}"
 
 
 def _weigh(path: Path, node: yaml.Node, weights: dict[int, int], depth: int) -> int:

@@ -70,7 +70,7 @@ class Cluster:
         except (OSError, asyncio.CancelledError):
             return 0
 
-    def mend(self) -> None:
+    def fix(self) -> None:
         """Start those workers of our own again that dask has given up."""
         if self._own is None or not self.usable:
             return
@@ -115,10 +115,8 @@ class Cluster:
                 address, timeout=CONNECT_SECONDS, set_as_default=False
             )
         except (OSError, ValueError) as error:
-            mend = "start one with: dask scheduler; the address is in its first lines"
-            raise ExneatError(
-                f"executor.address: expected a dask scheduler at {address}, got none\n  {mend}"
-            ) from error
+            fix = "start one with: dask scheduler; the address is in its first lines"
+            raise ExneatError(f"executor.address: expected a dask scheduler at {address}, got none\n  {fix}") from error
         self._ending.callback(client.close)
         return client
 

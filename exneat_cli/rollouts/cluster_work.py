@@ -148,8 +148,8 @@ class _UnderWay:
         if future.status == "error":
             error = future.exception()
             if isinstance(error, ImportError):
-                mend = "install the same exneat[dask] on all machines and start the workers again"
-                raise ExneatError(f"executor=dask: a worker cannot import what it needs: {error}\n  {mend}") from error
+                fix = "install the same exneat[dask] on all machines and start the workers again"
+                raise ExneatError(f"executor=dask: a worker cannot import what it needs: {error}\n  {fix}") from error
             if not isinstance(error, KilledWorker):
                 raise error
             if sent_before >= RESUBMISSIONS:
@@ -164,14 +164,14 @@ class _UnderWay:
         self._threads = self._cluster.threads()
         now = time.monotonic()
         if not self._executor.address and self._threads < self._executor.threads:
-            self._cluster.mend()
+            self._cluster.fix()
         if self._threads:
             self._workers_seen = now
         elif now - self._workers_seen > PATIENCE_SECONDS:
-            mend = "start some: dask worker <address> --nworkers auto --nthreads 1"
+            fix = "start some: dask worker <address> --nworkers auto --nthreads 1"
             raise ExneatError(
                 f"executor=dask: {self._where()} had no workers for {PATIENCE_SECONDS:.0f} s"
-                + (f"\n  {mend}" if self._executor.address else "")
+                + (f"\n  {fix}" if self._executor.address else "")
             )
 
     def _where(self) -> str:

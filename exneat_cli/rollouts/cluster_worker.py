@@ -13,11 +13,11 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 import exneat_cli
+from exneat_cli.compiling import source_digest
 from exneat_cli.errors import ExneatError
 from exneat_cli.rollouts.outcomes import Results
 from exneat_cli.rollouts.player import Crew, Player, Setup
 from exneat_cli.seeding import EpisodeSeeds
-from exneat_cli.tasks.compiling import source_digest
 
 SETUPS_KEPT = 4
 """A worker keeps the opened worlds of this many setups; a robustness sweep has one per level."""
@@ -61,8 +61,8 @@ def play_parcel(expected: dict[str, str], parcel: bytes) -> Played:
     """
     for name, wanted in expected.items():
         if (came := versions()[name]) != wanted:
-            mend = "install the same on all machines and start the workers again"
-            raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {mend}")
+            fix = "install the same on all machines and start the workers again"
+            raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {fix}")
     setup, crew, episodes = pickle.loads(parcel)
     players = _players_of(setup)
     try:

@@ -11,8 +11,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.brains.brain import activate
+from exneat_cli.compiling import compiled_lean, with_functions
 from exneat_cli.tasks import RUNNING, Simulation
-from exneat_cli.tasks.compiling import compiled_lean, with_functions
 
 
 class Conditions(NamedTuple):
@@ -71,7 +71,7 @@ def _episodes(  # type: ignore[no-untyped-def]
     """Draw one world and run some brains through it, one after another, each from its start.
 
     Noise is drawn when the first brain needs it and kept for the others: all of them face the same.
-    The names reset, restart, observe, step and locate are bound by `episode_loop`.
+    The names reset, rewind, observe, step and locate are bound by `episode_loop`.
 
     Args:
         world: the task's storage.
@@ -99,7 +99,7 @@ def _episodes(  # type: ignore[no-untyped-def]
     reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
     for b in range(first, last):
         if b > first:
-            restart(world)  # type: ignore[name-defined]  # noqa: F821
+            rewind(world)  # type: ignore[name-defined]  # noqa: F821
         memory[:] = 0.0
         totals[b] = 0.0
         if trace.shape[0] > 0:
@@ -146,7 +146,7 @@ def episode_loop(simulation: Simulation, task: str) -> Callable[..., Any]:
     return _bind(
         task,
         simulation.reset,
-        simulation.restart,
+        simulation.rewind,
         simulation.observe,
         simulation.step,
         simulation.locate,
@@ -156,13 +156,13 @@ def episode_loop(simulation: Simulation, task: str) -> Callable[..., Any]:
 
 @functools.cache
 def _bind(  # type: ignore[no-untyped-def]
-    task: str, reset, restart, observe, step, locate, compile_it: bool
+    task: str, reset, rewind, observe, step, locate, compile_it: bool
 ) -> Callable[..., Any]:
     loop = with_functions(
         _episodes,
         f"episodes_of_{task}",
         reset=reset,
-        restart=restart,
+        rewind=rewind,
         observe=observe,
         step=step,
         locate=locate,

@@ -42,8 +42,8 @@ class Executor:
         if not isinstance(self.address, str) or not _ADDRESS.fullmatch(self.address):
             raise ConfigError("executor.address", "a scheduler's address such as tcp://10.0.0.1:8786", self.address)
         if self.workers:
-            mend = "a cluster at an address has the workers that were started for it"
-            raise ConfigError("executor.workers", "0 together with executor.address", self.workers, mend)
+            fix = "a cluster at an address has the workers that were started for it"
+            raise ConfigError("executor.workers", "0 together with executor.address", self.workers, fix)
 
     @property
     def threads(self) -> int:

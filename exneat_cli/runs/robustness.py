@@ -1,7 +1,7 @@
 """Robustness of a finished run: its champion, or its baseline, under perturbations.
 
 Source of the protocol: Zhang (2025), section 3.4; every run's champion at every level, in worlds that are
-the same for all arms.
+the same for all variants.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     if manifest.get("format") != MANIFEST_FORMAT:
         raise ExneatError(f"{where}: expected a run of format {MANIFEST_FORMAT}, got {manifest.get('format')!r}")
     if manifest.get("status") != DONE:
-        mend = "finish it first: the command that began it, with resume=true"
-        raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {mend}")
+        fix = "finish it first: the command that began it, with resume=true"
+        raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {fix}")
     try:
         settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
@@ -87,10 +87,10 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
             try:
                 perturbed(settings.task, settings.noise, sweep, level)
             except ConfigError as error:
-                key, expected, came, mend = error.args
+                key, expected, came, fix = error.args
                 if key != "sweep":
-                    mend = f"level {level:g} of sweep {sweep.name} sets it; choose others with sweep.levels=[...]"
-                raise ConfigError(key, expected, came, mend) from error
+                    fix = f"level {level:g} of sweep {sweep.name} sets it; choose others with sweep.levels=[...]"
+                raise ConfigError(key, expected, came, fix) from error
 
 
 @keep_clusters()
@@ -152,8 +152,10 @@ def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
 def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:
     if settings.algorithm not in UNTRAINED:
         champion = read_champion(directory.champion)
-        if champion.arm != settings.arm:
-            raise ExneatError(f"{directory.champion}: expected a champion of {settings.arm}, got {champion.arm}")
+        if champion.variant != settings.variant:
+            raise ExneatError(
+                f"{directory.champion}: expected a champion of {settings.variant}, got {champion.variant}"
+            )
         if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
             raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
         return [champion.brain()]

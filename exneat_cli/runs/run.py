@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from exneat_cli.algorithms import Team
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Team
 from exneat_cli.interruption import before_the_end, heeding
 from exneat_cli.records import (
     DONE,
@@ -145,7 +145,7 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
         "format": MANIFEST_FORMAT,
         "status": RUNNING,
         "process": os.getpid(),
-        "arm": settings.arm,
+        "variant": settings.variant,
         "task": settings.task.name,
         "seed": settings.seed,
         "configuration_hash": settings.full_hash,
@@ -234,7 +234,7 @@ def _standing_still(settings: RunSettings) -> Brain:
 
 def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
     return Champion(
-        arm=settings.arm,
+        variant=settings.variant,
         task=settings.to_plain()["task"],
         actuators=settings.task.actuator_names,
         feed_forward=settings.evolution.feed_forward,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from exneat_cli.evolution import ArrayGenome, Columns, Entry, Snapshot, Team, pack, unpack
+from exneat_cli.algorithms import ArrayGenome, Columns, Entry, Snapshot, Team, pack, unpack
 from exneat_cli.records import Checkpoint, HistoryRow
 
 _CURRENT, _REMEMBERED = "current", "remembered"

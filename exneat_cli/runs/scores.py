@@ -68,11 +68,11 @@ def baseline(task: Task, algorithm: str) -> list[Brain] | RandomActions:
         return RandomActions(*task.action_bounds)
     if algorithm == "motionless":
         return [motionless(task.observation_size, task.resting_action)]
-    return [linear_fusion(task.observation_size, len(task.actuator_names), task.sectors)]
+    return [linear_fusion(task.observation_size, len(task.actuator_names), task.parts)]
 
 
 def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
-    """The test episodes, equal for all runs and arms; random actions are drawn from the run's own stream."""
+    """The test episodes, equal for all runs and variants; random actions are drawn from the run's own stream."""
     tests = shared_episodes("test", episodes)
     if settings.algorithm != "random":
         return tests
@@ -83,7 +83,7 @@ def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
 def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:
     """A run's score at one level of a sweep."""
     figures = (score.fitness_mean, score.fitness_std, score.full_reward_mean, score.full_reward_std)
-    return RobustnessRow(settings.arm, settings.seed, parameter, float(level), score.episodes, *figures)
+    return RobustnessRow(settings.variant, settings.seed, parameter, float(level), score.episodes, *figures)
 
 
 def summary_sentence(task: Task, result: dict[str, Any]) -> str:

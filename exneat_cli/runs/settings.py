@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from exneat_cli.algorithms import PAIRINGS, RECURRENT, EvolutionSettings
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole, shortened
-from exneat_cli.evolution import PAIRINGS, RECURRENT, EvolutionSettings
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, Task
@@ -23,7 +23,7 @@ _Part = TypeVar("_Part")
 
 @dataclass(frozen=True)
 class RunSettings:
-    """One training of one arm with one seed; the defaults are Ant's quick budget.
+    """One training of one variant with one seed; the defaults are Ant's quick budget.
 
     Attributes:
         task: what is learned.
@@ -83,11 +83,11 @@ class RunSettings:
         if not isinstance(self.output, str) or not self.output or not self.output.isprintable():
             raise ConfigError("output", "a directory, without control characters", self.output)
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
-            mend = "run directories stay below output=; set that to write elsewhere"
-            raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, mend)
+            fix = "run directories stay below output=; set that to write elsewhere"
+            raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         if not self.task.has_initial_pose and self.noise.reset_scale != Noise().reset_scale:
-            mend = f"task={self.task.name} has no initial pose that noise could disturb"
-            raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, mend)
+            fix = f"task={self.task.name} has no initial pose that noise could disturb"
+            raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, fix)
         _ = self.plan
 
     @property
@@ -97,11 +97,11 @@ class RunSettings:
         return plan_wiring(self.task, self.algorithm, self.geometry, self.linkage, self.wiring, hidden=hidden)
 
     @property
-    def arm(self) -> str:
+    def variant(self) -> str:
         """What is compared, in one word, e.g. ``exneat-all-none`` or ``neat``."""
         if self.algorithm != "exneat":
             return self.algorithm
-        vector = self.geometry.subpopulations(self.task.sectors) if self.geometry.vector else ()
+        vector = self.geometry.subpopulations(self.task.parts) if self.geometry.vector else ()
         geometry = self.geometry.name + "".join(str(entry) for entry in vector)
         decentral = self.task.trunk is not None and self.wiring.central is False
         return f"exneat-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
@@ -113,9 +113,9 @@ class RunSettings:
 
     @property
     def directory(self) -> RunDirectory:
-        """Where the run keeps its files: ``<output>/<name>/<arm>-s<seed>-<hash>``."""
+        """Where the run keeps its files: ``<output>/<name>/<variant>-s<seed>-<hash>``."""
         short = configuration_hash(self._identity(), with_seed=False)[:6]
-        return RunDirectory(Path(self.output) / (self.name or self.task.name) / f"{self.arm}-s{self.seed}-{short}")
+        return RunDirectory(Path(self.output) / (self.name or self.task.name) / f"{self.variant}-s{self.seed}-{short}")
 
     @property
     def full_hash(self) -> str:
@@ -127,7 +127,7 @@ class RunSettings:
         plain = self.to_plain()
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
-            plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.sectors))
+            plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))
         return plain
 
     def to_plain(self) -> dict[str, Any]:

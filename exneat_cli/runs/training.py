@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from exneat_cli.algorithms import Coevolution, Entry, HallOfFame, Team, check_genome, neat_config
 from exneat_cli.brains import assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Coevolution, Entry, HallOfFame, Team, check_genome, neat_config
 from exneat_cli.records import Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.saved_training import SavedTraining
@@ -44,7 +44,7 @@ def evolve(
     say: Callable[[str], None] = lambda _: None,
     save: Callable[[Checkpoint], None] | None = None,
 ) -> Trained:
-    """Train one arm.
+    """Train one variant.
 
     Args:
         settings: of the run.

@@ -5,11 +5,11 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
-from exneat_cli.tasks.ant import AntTask
-from exneat_cli.tasks.grid_environment import WORLDS
-from exneat_cli.tasks.mazes import GeneralMaze, TrackMaze
-from exneat_cli.tasks.predator_prey import Foraging, Hunting
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Sector, Simulation, Task
+from exneat_cli.tasks.grid.environment import WORLDS
+from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
+from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
+from exneat_cli.tasks.robots.ant import AntTask
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task
 
 TASKS: dict[str, type[Task]] = {
     "ant": AntTask,
@@ -21,7 +21,7 @@ TASKS: dict[str, type[Task]] = {
 """Every task by the name it has in `conf/task`."""
 
 for _id in WORLDS:
-    gymnasium.register(id=_id, entry_point="exneat_cli.tasks.grid_environment:GridEnvironment", kwargs={"world": _id})
+    gymnasium.register(id=_id, entry_point="exneat_cli.tasks.grid.environment:GridEnvironment", kwargs={"world": _id})
 
 __all__ = [
     "ENDED",
@@ -32,7 +32,7 @@ __all__ = [
     "Foraging",
     "GeneralMaze",
     "Hunting",
-    "Sector",
+    "Part",
     "Simulation",
     "Task",
     "TrackMaze",

@@ -17,12 +17,12 @@ FAILED = 2
 """The simulation exploded or a value was not finite; nothing that it gave counts."""
 
 
-FUNCTIONS = ("reset", "restart", "observe", "step", "locate")
+FUNCTIONS = ("reset", "rewind", "observe", "step", "locate")
 """What a module that simulates a task must define; see `Simulation`."""
 
 
 @dataclass(frozen=True)
-class Sector:
+class Part:
     """A place of the body with its own sensors, and maybe its own actuators.
 
     Attributes:
@@ -48,7 +48,7 @@ class Simulation:
     Attributes:
         world: the storage, first argument of all five.
         reset: ``reset(world, rng)`` draws all the chance of a new world from a NumPy Generator, and starts it.
-        restart: ``restart(world)`` takes the same world back to its start.
+        rewind: ``rewind(world)`` takes the same world back to its start.
         observe: ``observe(world, observation)`` writes the noiseless observation.
         step: ``step(world, action, terms)`` acts once, writes this step's reward terms and returns
             `RUNNING`, `ENDED` or `FAILED`.
@@ -59,7 +59,7 @@ class Simulation:
 
     world: Any
     reset: Callable[..., Any]
-    restart: Callable[..., Any]
+    rewind: Callable[..., Any]
     observe: Callable[..., Any]
     step: Callable[..., Any]
     locate: Callable[..., Any]
@@ -71,7 +71,7 @@ class Simulation:
         """A simulation whose functions are those of a module or namespace, unless `others` names one.
 
         Args:
-            functions: has `reset`, `restart`, `observe`, `step` and `locate`.
+            functions: has `reset`, `rewind`, `observe`, `step` and `locate`.
             world: the storage they work on.
             compiled: whether they are compiled.
             others: replace single fields, e.g. `reset` or `owner`.
@@ -115,12 +115,12 @@ class Task(Protocol):
         """The action that does nothing, (actuators,)."""
 
     @property
-    def sectors(self) -> tuple[Sector, ...]:
+    def parts(self) -> tuple[Part, ...]:
         """The places of the body, in the order that a geometry vector indexes."""
 
     @property
-    def trunk(self) -> Sector | None:
-        """What belongs to no sector, for a central module; None if there is no such thing."""
+    def trunk(self) -> Part | None:
+        """What belongs to no part, for a central module; None if there is no such thing."""
 
     @property
     def observation_size(self) -> int:

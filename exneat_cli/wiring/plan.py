@@ -1,6 +1,6 @@
 """The wiring plan: which pins every module has, and what it drives.
 
-A plan is plain data. Modules come in the order of the task's sectors, the central module last; pins
+A plan is plain data. Modules come in the order of the task's parts, the central module last; pins
 come in the order in which genomes see them.
 """
 
@@ -37,7 +37,7 @@ class Module:
     """One network of the brain, as wired.
 
     Attributes:
-        name: the sector's name, ``central``, or ``body`` for NEAT's only module.
+        name: the part's name, ``central``, or ``body`` for NEAT's only module.
         position: (x, y) seen from the trunk, x ahead and y left.
         subpopulation: which subpopulation its genomes come from.
         pins: its inputs.
@@ -70,7 +70,7 @@ class Plan:
     """A whole brain, as wired.
 
     Attributes:
-        modules: sector modules in the task's order, then the central module if there is one.
+        modules: part modules in the task's order, then the central module if there is one.
         observation_size: length of the observation.
         action_size: length of the action.
     """

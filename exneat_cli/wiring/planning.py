@@ -21,7 +21,7 @@ class Wiring:
 
     Attributes:
         central: whether there is a central module; None means yes where the task has a trunk.
-        output_width: outputs of each sector module where a central module reads them.
+        output_width: outputs of each part module where a central module reads them.
 
     Raises:
         ConfigError: a value is out of range.
@@ -37,10 +37,10 @@ class Wiring:
 
 
 def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wiring: Wiring, *, hidden: int) -> Plan:
-    """The plan of one arm.
+    """The plan of one variant.
 
     Args:
-        task: gives sectors, trunk and sizes.
+        task: gives parts, trunk and sizes.
         algorithm: ``neat`` (one module senses and drives everything) or ``exneat``; those of
             `UNTRAINED` have no modules at all.
         geometry: which modules share genomes.
@@ -56,9 +56,9 @@ def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wi
     if algorithm == "exneat":
         return _plan_modules(task, geometry, linkage, wiring, hidden)
     _refuse_modular_settings(algorithm, geometry, linkage, wiring)
-    if algorithm == "linear_fusion" and any(len(sector.actuators) != 1 for sector in task.sectors):
-        mend = "it moves to where the sum of a sector's sensors is largest, so only grid worlds have it"
-        raise ConfigError("algorithm", "exneat, neat or random", algorithm, mend)
+    if algorithm == "linear_fusion" and any(len(part.actuators) != 1 for part in task.parts):
+        fix = "it moves to where the sum of a part's sensors is largest, so only grid worlds have it"
+        raise ConfigError("algorithm", "exneat, neat or random", algorithm, fix)
     actuators = tuple(range(len(task.actuator_names)))
     everything = Module(
         name="body",
@@ -73,22 +73,22 @@ def plan_wiring(task: Task, algorithm: str, geometry: Geometry, linkage: str, wi
 
 
 def _plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, hidden: int) -> Plan:
-    sectors = task.sectors
+    parts = task.parts
     central = task.trunk is not None if wiring.central is None else wiring.central
     _check_links(task, linkage, wiring, central, hidden)
-    outputs = [wiring.output_width if central else len(sector.actuators) for sector in sectors]
+    outputs = [wiring.output_width if central else len(part.actuators) for part in parts]
     modules = []
-    for own, (sector, subpopulation) in enumerate(zip(sectors, geometry.subpopulations(sectors), strict=True)):
-        links = link_pins(linkage, sectors, own, outputs=outputs, hidden=hidden, central=len(sectors))
+    for own, (part, subpopulation) in enumerate(zip(parts, geometry.subpopulations(parts), strict=True)):
+        links = link_pins(linkage, parts, own, outputs=outputs, hidden=hidden, central=len(parts))
         modules.append(
             Module(
-                name=sector.name,
-                position=sector.position,
+                name=part.name,
+                position=part.position,
                 subpopulation=subpopulation,
-                pins=sensor_pins(sector.sensors) + links,
+                pins=sensor_pins(part.sensors) + links,
                 outputs=outputs[own],
                 hidden=hidden,
-                drives=() if central else sector.actuators,
+                drives=() if central else part.actuators,
             )
         )
     _check_sharers(modules)
@@ -116,16 +116,16 @@ def _check_links(task: Task, linkage: str, wiring: Wiring, central: bool, hidden
     if central and task.trunk is None:
         raise ConfigError("wiring.central", "false", True, f"task={task.name} has no trunk for a central module")
     if linkage in ("feedback", "full") and not central:
-        mend = "these links read a central module: set wiring.central=true"
+        fix = "these links read a central module: set wiring.central=true"
         if task.trunk is None:
-            mend = f"these links read a central module, and task={task.name} has no trunk for one"
-        raise ConfigError("linkage", "none, output or hidden without a central module", linkage, mend)
+            fix = f"these links read a central module, and task={task.name} has no trunk for one"
+        raise ConfigError("linkage", "none, output or hidden without a central module", linkage, fix)
     if linkage in ("hidden", "full") and hidden == 0:
-        mend = "modules start without hidden nodes here: set evolution.module_hidden"
-        raise ConfigError("linkage", "links that read no hidden nodes", linkage, mend)
+        fix = "modules start without hidden nodes here: set evolution.module_hidden"
+        raise ConfigError("linkage", "links that read no hidden nodes", linkage, fix)
     if not central and wiring.output_width != Wiring().output_width:
-        mend = "without a central module each sector module has one output per actuator"
-        raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, mend)
+        fix = "without a central module each part module has one output per actuator"
+        raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, fix)
 
 
 def _check_sharers(modules: list[Module]) -> None:
@@ -140,12 +140,12 @@ def _check_sharers(modules: list[Module]) -> None:
 
 
 def _refuse_modular_settings(algorithm: str, geometry: Geometry, linkage: str, wiring: Wiring) -> None:
-    mend = f"algorithm={algorithm} has no sector modules; drop this setting or use algorithm=exneat"
+    fix = f"algorithm={algorithm} has no part modules; drop this setting or use algorithm=exneat"
     if geometry.name != "single":
-        raise ConfigError("geometry", "single, its default", geometry.name, mend)
+        raise ConfigError("geometry", "single, its default", geometry.name, fix)
     if linkage != "none":
-        raise ConfigError("linkage", "none, its default", linkage, mend)
+        raise ConfigError("linkage", "none, its default", linkage, fix)
     if wiring.central:
-        raise ConfigError("wiring.central", "null or false", True, mend)
+        raise ConfigError("wiring.central", "null or false", True, fix)
     if wiring.output_width != Wiring().output_width:
-        raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, mend)
+        raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, fix)

@@ -15,7 +15,7 @@ Levels = Mapping[tuple[str, float], tuple[float, float]]
 def plan_study(
     directory: Path,
     *,
-    arms: Mapping[str, str] | None = None,
+    variants: Mapping[str, str] | None = None,
     baselines: Sequence[str] = ("random",),
     conditions: Mapping[str, str] | None = None,
     seeds: int = 3,
@@ -24,13 +24,13 @@ def plan_study(
     has_full_reward: bool = False,
 ) -> Study:
     """A study none of whose runs is finished."""
-    arms = arms or {"neat": "NEAT", "exneat": "ExNEAT", "random": "random actions"}
+    variants = variants or {"neat": "NEAT", "exneat": "ExNEAT", "random": "random actions"}
     conditions = conditions or {"calm": "no noise", "noisy": "much noise"}
     runs = tuple(
-        PlannedRun(condition, arm, seed, RunDirectory(directory / experiment / f"{condition}-{arm}-s{seed}"))
+        PlannedRun(condition, variant, seed, RunDirectory(directory / experiment / f"{condition}-{variant}-s{seed}"))
         for condition in conditions
-        for arm in arms
-        for seed in range(1 if arm in baselines else seeds)
+        for variant in variants
+        for seed in range(1 if variant in baselines else seeds)
     )
     return Study(
         experiment=experiment,
@@ -39,7 +39,7 @@ def plan_study(
         command=f"exneat sweep experiment={experiment} budget={budget}",
         fitness_name="fitness",
         has_full_reward=has_full_reward,
-        arms=arms,
+        variants=variants,
         baselines=tuple(baselines),
         conditions=conditions,
         sweeps={"sensor_noise": "sensor noise (sd)"},
@@ -65,7 +65,7 @@ def finish(
     champion = {"episodes": 20, "fitness_mean": test, "fitness_std": 0.1, "full_reward_mean": full_reward}
     manifest: dict[str, object] = {
         "status": DONE,
-        "arm": run.arm,
+        "variant": run.variant,
         "seed": run.seed,
         "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"}),
     }
@@ -78,18 +78,18 @@ def finish(
         manifest["budget_spent"] = {"episodes": episodes, "env_steps": env_steps, "wall_seconds": 90.5}
         result = {"training": curve[-1], "validation": validation, **result}
     if levels is not None:
-        rows = [(run.arm, run.seed, *place, 20, f, 0.0, full, 0.0) for place, (f, full) in levels.items()]
-        columns = ("arm", "run_seed", "parameter", "level", "episodes", "fitness_mean", "fitness_std")
+        rows = [(run.variant, run.seed, *place, 20, f, 0.0, full, 0.0) for place, (f, full) in levels.items()]
+        columns = ("variant", "run_seed", "parameter", "level", "episodes", "fitness_mean", "fitness_std")
         write_csv(directory.robustness, (*columns, "full_reward_mean", "full_reward_std"), rows)
     write_json(directory.manifest, {**manifest, "result": result})
 
 
 def finish_all(study: Study, levels: Levels | None = None) -> Study:
-    """Finish every run: later arms and seeds do better; returns a study that sees them."""
-    rank = {arm: k for k, arm in enumerate(study.arms)}
+    """Finish every run: later variants and seeds do better; returns a study that sees them."""
+    rank = {variant: k for k, variant in enumerate(study.variants)}
     for run in study.runs:
-        end = 0.3 + 0.1 * rank[run.arm] + 0.013 * run.seed
-        curve = () if run.arm in study.baselines else (0.5 * end, end, end)
+        end = 0.3 + 0.1 * rank[run.variant] + 0.013 * run.seed
+        curve = () if run.variant in study.baselines else (0.5 * end, end, end)
         finish(run, curve, test=end - 0.05, full_reward=end + 1.0, validation=end, levels=levels)
     return seen_anew(study)
 
@@ -99,6 +99,6 @@ def seen_anew(study: Study) -> Study:
     return Study(**{name: getattr(study, name) for name in Study.__dataclass_fields__})
 
 
-def run_of(study: Study, condition: str, arm: str, seed: int) -> PlannedRun:
+def run_of(study: Study, condition: str, variant: str, seed: int) -> PlannedRun:
     """One planned run."""
-    return next(run for run in study.runs if (run.condition, run.arm, run.seed) == (condition, arm, seed))
+    return next(run for run in study.runs if (run.condition, run.variant, run.seed) == (condition, variant, seed))

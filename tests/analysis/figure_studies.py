@@ -29,28 +29,28 @@ COMMAND = "exneat sweep experiment=made_up budget=quick"
 def a_study(
     root: Path,
     *,
-    arms: Mapping[str, str] | None = None,
+    variants: Mapping[str, str] | None = None,
     baselines: Sequence[str] = ("random",),
     seeds: int = 3,
     scale: float = 1.0,
     swept: Sequence[str] | None = None,
     generations: int = 8,
 ) -> Study:
-    """Two conditions, all runs finished; `swept` names the arms with sweeps in robustness.csv, by default all."""
-    arms = arms or {"neat": "NEAT", "exneat": "ExNEAT single", "random": "random actions"}
+    """Two conditions, all runs finished; `swept` names the variants with sweeps in robustness.csv, by default all."""
+    variants = variants or {"neat": "NEAT", "exneat": "ExNEAT single", "random": "random actions"}
     conditions = {"noise": "sensor noise 0.05", "long": "17 tiles"}
     runs = []
     for condition in conditions:
-        for place, arm in enumerate(arms):
-            for seed in range(1 if arm in baselines else seeds):
-                run = RunDirectory(root / condition / f"{arm}-s{seed}")
-                runs.append(PlannedRun(condition, arm, seed, run))
-                if arm in baselines:
-                    finish_baseline(run, arm, scale)
+        for place, variant in enumerate(variants):
+            for seed in range(1 if variant in baselines else seeds):
+                run = RunDirectory(root / condition / f"{variant}-s{seed}")
+                runs.append(PlannedRun(condition, variant, seed, run))
+                if variant in baselines:
+                    finish_baseline(run, variant, scale)
                 else:
-                    finish(run, arm, seed, scale * (0.5 + 0.1 * place), generations)
-                sweeps = SWEEPS if swept is None or arm in swept else {}
-                write_robustness(run, arm, seed, scale * (0.4 + 0.1 * place), sweeps)
+                    finish(run, variant, seed, scale * (0.5 + 0.1 * place), generations)
+                sweeps = SWEEPS if swept is None or variant in swept else {}
+                write_robustness(run, variant, seed, scale * (0.4 + 0.1 * place), sweeps)
     return Study(
         experiment="made_up",
         budget="quick",
@@ -58,7 +58,7 @@ def a_study(
         command=COMMAND,
         fitness_name="forward reward" if scale > 1.0 else "fitness",
         has_full_reward=scale > 1.0,
-        arms=arms,
+        variants=variants,
         baselines=tuple(baselines),
         conditions=conditions,
         sweeps=SWEEPS,
@@ -66,10 +66,10 @@ def a_study(
     )
 
 
-def finish(run: RunDirectory, arm: str, seed: int, height: float, generations: int = 8) -> None:
+def finish(run: RunDirectory, variant: str, seed: int, height: float, generations: int = 8) -> None:
     """A trained run: the better on validation, the higher its seed."""
     run.path.mkdir(parents=True, exist_ok=True)
-    rng = np.random.default_rng([seed, len(arm)])
+    rng = np.random.default_rng([seed, len(variant)])
     gains = np.abs(rng.normal(0.06, 0.04, generations)) * height
     best = height * 0.5 + np.cumsum(gains) + 0.03 * height * seed
     steps = np.cumsum(rng.integers(5_000, 9_000, generations))
@@ -78,28 +78,30 @@ def finish(run: RunDirectory, arm: str, seed: int, height: float, generations: i
         for g in range(generations)
     ]
     write_history(run.history, rows)
-    write_json(run.champion, grid_champion() if arm == "neat" else modular_champion())
+    write_json(run.champion, grid_champion() if variant == "neat" else modular_champion())
     scores = {"fitness_mean": float(best[-1]), "fitness_std": 0.1, "full_reward_mean": float(best[-1]), "episodes": 20}
     result = {"training": float(best[-1]), "validation": float(seed), "champion": scores}
     spent = {"episodes": 1000 * generations, "env_steps": int(steps[-1]), "wall_seconds": 1.0}
     write_json(run.manifest, {"status": DONE, "result": result, "budget_spent": spent})
 
 
-def finish_baseline(run: RunDirectory, arm: str, scale: float) -> None:
+def finish_baseline(run: RunDirectory, variant: str, scale: float) -> None:
     """A run that nothing trained."""
     run.path.mkdir(parents=True, exist_ok=True)
     champion = {"fitness_mean": 0.2 * scale, "fitness_std": 0.1, "full_reward_mean": 0.2 * scale, "episodes": 20}
-    write_json(run.manifest, {"status": DONE, "arm": arm, "result": {"champion": champion}})
+    write_json(run.manifest, {"status": DONE, "variant": variant, "result": {"champion": champion}})
 
 
-def write_robustness(run: RunDirectory, arm: str, seed: int, height: float, sweeps: Mapping[str, str] = SWEEPS) -> None:
+def write_robustness(
+    run: RunDirectory, variant: str, seed: int, height: float, sweeps: Mapping[str, str] = SWEEPS
+) -> None:
     """robustness.csv: fitness falls with the level, and rises by a hundredth of `height` per seed."""
-    rows = [RobustnessRow(arm, seed, UNPERTURBED, 0.0, 20, height, 0.1, height, 0.1)]
+    rows = [RobustnessRow(variant, seed, UNPERTURBED, 0.0, 20, height, 0.1, height, 0.1)]
     for parameter in sweeps:
         for level in LEVELS:
-            fitness = height * (1.0 - level) * (1.0 if arm != "random" else 0.4) + 0.01 * height * seed
+            fitness = height * (1.0 - level) * (1.0 if variant != "random" else 0.4) + 0.01 * height * seed
             rows.append(
-                RobustnessRow(arm, seed, parameter, level, 20, fitness, 0.1 * height, 2 * fitness, 0.2 * height)
+                RobustnessRow(variant, seed, parameter, level, 20, fitness, 0.1 * height, 2 * fitness, 0.2 * height)
             )
     merge_robustness(run.robustness, rows)
 
@@ -137,7 +139,7 @@ def a_champion(
     """What a champion file holds, as far as pictures need it."""
     return {
         "format": 1,
-        "arm": "made-up",
+        "variant": "made-up",
         "task": {"name": "made_up"},
         "actuators": list(actuators),
         "feed_forward": True,

@@ -14,16 +14,16 @@ from tests.analysis.fake_studies import finish, finish_all, plan_study, run_of
 
 
 def csv_of(table: Built) -> pd.DataFrame:
-    return pd.read_csv(table.paths[0], dtype={"efficiency": str}).set_index(["condition", "arm"])
+    return pd.read_csv(table.paths[0], dtype={"efficiency": str}).set_index(["condition", "variant"])
 
 
-def test_every_arm_is_compared_in_every_condition(tmp_path: Path) -> None:
+def test_every_variant_is_compared_in_every_condition(tmp_path: Path) -> None:
     table = build_comparison(finish_all(plan_study(tmp_path)), tmp_path / "report")
     assert [path.name for path in table.paths] == ["comparison-track.csv", "comparison-track.md"]
     assert [row[:3] for row in table.rows] == [
-        (condition, arm, runs)
+        (condition, variant, runs)
         for condition in ("no noise", "much noise")
-        for arm, runs in (("NEAT", "3"), ("ExNEAT", "3"), ("random actions", "1"))
+        for variant, runs in (("NEAT", "3"), ("ExNEAT", "3"), ("random actions", "1"))
     ]
     figures = csv_of(table).loc[("no noise", "ExNEAT")]
     assert figures["training_mean"] == pytest.approx(0.413)
@@ -47,7 +47,7 @@ def test_conditions_without_a_finished_run_are_left_out(tmp_path: Path) -> None:
     assert {row[0] for row in build_comparison(study, tmp_path / "report").rows} == {"much noise"}
 
 
-def test_without_the_first_arm_there_are_figures_but_no_comparison(tmp_path: Path) -> None:
+def test_without_the_first_variant_there_are_figures_but_no_comparison(tmp_path: Path) -> None:
     study = plan_study(tmp_path)
     finish(run_of(study, "calm", "exneat", 0), (0.5,), test=0.4)
     figures = csv_of(build_comparison(study, tmp_path / "report"))

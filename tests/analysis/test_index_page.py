@@ -59,7 +59,7 @@ def a_figure(directory: Path, name: str = "figure-4.1", **changes: str) -> Built
 
 def a_table(directory: Path, name: str = "table-5.1") -> Built:
     rows = (("NEAT", "0.300"), ("ExNEAT", ">20"))
-    return Built(name, "Both", "Means.", (directory / f"{name}.csv",), ("arm", "ours"), rows)
+    return Built(name, "Both", "Means.", (directory / f"{name}.csv",), ("variant", "ours"), rows)
 
 
 def a_report(directory: Path) -> Path:
@@ -115,7 +115,7 @@ def test_chapters_come_in_order_with_tables_before_figures(tmp_path: Path) -> No
 def test_text_from_files_is_never_taken_for_markup(tmp_path: Path) -> None:
     evil = '<script>"&amp;'
     study = finish_all(
-        plan_study(tmp_path / "runs", arms={"neat": evil, "exneat": "E"}, baselines=(), conditions={"calm": evil})
+        plan_study(tmp_path / "runs", variants={"neat": evil, "exneat": "E"}, baselines=(), conditions={"calm": evil})
     )
     report = tmp_path / "report"
     artefacts = [
@@ -136,7 +136,7 @@ def test_the_page_says_what_was_run(tmp_path: Path) -> None:
     words = Page(write_index(tmp_path / "report", {"track": study}, [], {})).words
     assert "Small networks learn faster." in words
     assert "Budget quick: 2 of 14 runs finished, 1,234,567 environment steps of training, 3 min" in words
-    assert "No two arms have finished runs" in words
+    assert "No two variants have finished runs" in words
     assert "exneat 0.1.0 and 0.2.0, numpy 2.4.6." in words
     assert "NEAT260 to 2" in words
     assert "random actions020" in words

@@ -11,11 +11,11 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, PathPatch
 
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.analysis.network_data import ChampionGraph, champion_graph, read_champion_graph
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import Layout, depths, lay_out, natural_size, page_direction
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.records import Champion, RunDirectory, write_champion, write_json
 from exneat_cli.seeding import stream
 from exneat_cli.tasks import AntTask
@@ -137,7 +137,7 @@ def test_modules_stand_on_the_page_as_on_the_body() -> None:
     assert y[LEGS["front_left"]] == y[LEGS["front_right"]] > middle_y > y[LEGS["back_left"]] == y[LEGS["back_right"]]
 
 
-def test_the_sectors_of_a_map_keep_its_directions() -> None:
+def test_the_parts_of_a_map_keep_its_directions() -> None:
     sides = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)}
     modules = [
         a_module(name, place, 0, pins=[a_pin("sensor", k)], outputs=1, drives=[k])

@@ -29,7 +29,7 @@ def test_an_unfinished_run_does_not_count(tmp_path: Path) -> None:
     assert draw_means(empty_axes(), TRAINED, study, "generation") == {"neat": 1, "exneat": 2}
 
 
-def test_an_arm_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
+def test_an_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
     study = a_study(tmp_path, swept=["exneat", "random"])
     assert draw_levels(empty_axes(), SWEPT, study) == {"exneat": 3, "random": 1}
     assert draw_clusters(empty_axes(), SWEPT, study) == {"exneat": 3, "random": 1}
@@ -121,7 +121,7 @@ def test_full_reward_is_drawn_and_named_where_the_panel_asks_for_it(tmp_path: Pa
     np.testing.assert_allclose(other, 2 * one)
 
 
-def test_in_a_cluster_every_run_has_a_point_at_every_level_and_arms_do_not_mix(tmp_path: Path) -> None:
+def test_in_a_cluster_every_run_has_a_point_at_every_level_and_variants_do_not_mix(tmp_path: Path) -> None:
     axes = empty_axes()
     draw_clusters(axes, SWEPT, a_study(tmp_path, seeds=4))
     neat, exneat = [each for each in axes.collections if len(each.get_offsets()) == 4 * len(LEVELS)]

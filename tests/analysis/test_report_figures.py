@@ -24,9 +24,9 @@ PANELS = {
     "robustness": (Panel("made_up", "noise", sweep="sensor_noise"), Panel("made_up", "long", sweep="gap")),
     "cluster": (Panel("made_up", "noise", sweep="sensor_noise"),),
     "area": (Panel("made_up", "noise"),),
-    "network": (Panel("made_up", "noise", arm="neat"), Panel("made_up", "noise", arm="exneat")),
+    "network": (Panel("made_up", "noise", variant="neat"), Panel("made_up", "noise", variant="exneat")),
 }
-ARMS = {"neat": "NEAT", "exneat": "ExNEAT single", "random": "random actions"}
+VARIANTS = {"neat": "NEAT", "exneat": "ExNEAT single", "random": "random actions"}
 SWEPT = Panel("made_up", "noise", sweep="sensor_noise")
 TRAINED = Panel("made_up", "noise")
 
@@ -39,9 +39,9 @@ def empty_axes() -> Axes:
     return Figure().add_subplot()
 
 
-def without(study: Study, arm: str) -> Study:
-    """The study before the runs of one arm began."""
-    return replace(study, runs=tuple(run for run in study.runs if run.arm != arm))
+def without(study: Study, variant: str) -> Study:
+    """The study before the runs of one variant began."""
+    return replace(study, runs=tuple(run for run in study.runs if run.variant != variant))
 
 
 def test_there_is_a_figure_here_for_every_kind_of_the_catalogue() -> None:
@@ -65,7 +65,7 @@ def test_nothing_reaches_the_edge_of_the_picture(tmp_path: Path, kind: str) -> N
 
 
 @pytest.mark.parametrize("kind", ["training", "training_runs", "area", "network"])
-def test_an_arm_without_a_finished_run_is_named_with_the_command_that_makes_it(tmp_path: Path, kind: str) -> None:
+def test_an_variant_without_a_finished_run_is_named_with_the_command_that_makes_it(tmp_path: Path, kind: str) -> None:
     study = without(a_study(tmp_path), "exneat")
     with pytest.raises(MissingRunsError, match="no finished run of ExNEAT single") as raised:
         draw_figure(a_plan(kind), {"made_up": study}, tmp_path / "report")
@@ -109,10 +109,10 @@ def colours(axes: Axes) -> dict[str, str]:
     for handle, label in zip(handles, labels, strict=True):
         colour = handle.get_color() if hasattr(handle, "get_color") else handle.get_facecolor()[0][:3]
         found[label] = to_hex(colour)
-    return {label: colour for label, colour in found.items() if label in ARMS.values()}
+    return {label: colour for label, colour in found.items() if label in VARIANTS.values()}
 
 
-def test_an_arm_has_one_colour_in_all_figures(tmp_path: Path) -> None:
+def test_an_variant_has_one_colour_in_all_figures(tmp_path: Path) -> None:
     study = a_study(tmp_path)
     drawn = [empty_axes() for _ in range(5)]
     draw_means(drawn[0], TRAINED, study, "generation")
@@ -122,7 +122,7 @@ def test_an_arm_has_one_colour_in_all_figures(tmp_path: Path) -> None:
     draw_clusters(drawn[4], SWEPT, study)
     for axes in drawn:
         assert {"NEAT", "ExNEAT single"} <= set(colours(axes))
-    for label in ARMS.values():
+    for label in VARIANTS.values():
         assert len({colours(axes)[label] for axes in drawn if label in colours(axes)}) == 1
 
 
@@ -133,10 +133,10 @@ def test_the_caption_says_how_many_runs_of_what_budget_there_are(tmp_path: Path)
         "Made up, robustness. Panel 1, sensor noise 0.05, number of runs: NEAT 3; ExNEAT single 3;"
     )
     assert "Panel 2, 17 tiles" in caption
-    assert "Budget: quick. All arms had equal budgets of 8,000 training episodes per run" in caption
+    assert "Budget: quick. All variants had equal budgets of 8,000 training episodes per run" in caption
 
 
-def test_the_caption_says_so_when_arms_were_trained_for_longer_than_others(tmp_path: Path) -> None:
+def test_the_caption_says_so_when_variants_were_trained_for_longer_than_others(tmp_path: Path) -> None:
     study = a_study(tmp_path)
     for run in study.of("noise", "exneat"):
         run.directory.update_manifest(budget_spent={"episodes": 9000, "env_steps": 1, "wall_seconds": 1.0})
@@ -172,7 +172,7 @@ def test_the_champion_shown_is_that_of_the_run_best_on_validation(tmp_path: Path
         ("training", {"condition": "mud"}, "condition of made_up: expected one of noise, long, got 'mud'"),
         ("robustness", {"sweep": "rain"}, "sweep of made_up: expected one of sensor_noise, gap, got 'rain'"),
         ("robustness", {"value": "full_reward"}, "the task of made_up has no full reward"),
-        ("network", {"arm": "random"}, "trained arm of made_up: expected one of neat, exneat, got 'random'"),
+        ("network", {"variant": "random"}, "trained variant of made_up: expected one of neat, exneat, got 'random'"),
     ],
 )
 def test_a_panel_that_names_what_is_not_there_is_refused_with_what_is(
@@ -185,16 +185,18 @@ def test_a_panel_that_names_what_is_not_there_is_refused_with_what_is(
 
 
 def test_an_experiment_of_baselines_alone_has_nothing_to_show(tmp_path: Path) -> None:
-    study = a_study(tmp_path, arms={"random": "random actions"})
-    with pytest.raises(MissingRunsError, match="no arm of made_up is trained"):
+    study = a_study(tmp_path, variants={"random": "random actions"})
+    with pytest.raises(MissingRunsError, match="no variant of made_up is trained"):
         draw_figure(a_plan("training"), {"made_up": study}, tmp_path / "report")
 
 
-def test_a_figure_with_arms_of_its_own_shows_and_needs_no_others(tmp_path: Path) -> None:
-    study = a_study(tmp_path / "runs", arms={"neat": "NEAT", "exneat": "ExNEAT", "fb": "front and back"}, baselines=())
-    plan = replace(a_plan("training"), arms=("neat", "fb"))
+def test_a_figure_with_variants_of_its_own_shows_and_needs_no_others(tmp_path: Path) -> None:
+    study = a_study(
+        tmp_path / "runs", variants={"neat": "NEAT", "exneat": "ExNEAT", "fb": "front and back"}, baselines=()
+    )
+    plan = replace(a_plan("training"), variants=("neat", "fb"))
     caption = draw_figure(plan, {"made_up": without(study, "exneat")}, tmp_path).caption
     assert "front and back 3" in caption
     assert "ExNEAT" not in caption
-    with pytest.raises(ExneatError, match="trained arm of made_up: expected one of neat, exneat, fb, got 'all'"):
-        draw_figure(replace(plan, arms=("all",)), {"made_up": study}, tmp_path)
+    with pytest.raises(ExneatError, match="trained variant of made_up: expected one of neat, exneat, fb, got 'all'"):
+        draw_figure(replace(plan, variants=("all",)), {"made_up": study}, tmp_path)

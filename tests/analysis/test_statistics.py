@@ -174,36 +174,36 @@ def test_efficiency_is_the_first_generation_that_reaches_the_target(
     assert efficiency(curve, target) == generation
 
 
-def test_an_arm_that_is_good_early_has_more_area() -> None:
+def test_an_variant_that_is_good_early_has_more_area() -> None:
     assert area([0.0, 1.0, 1.0, 1.0]) == 0.75
     assert area([0.0, 0.0, 0.0, 1.0]) == 0.25
 
 
-def test_every_arm_is_compared_with_the_first_and_corrected_together() -> None:
+def test_every_variant_is_compared_with_the_first_and_corrected_together() -> None:
     low, middle, high = [0.1, 0.2, 0.3], [0.15, 0.25, 0.35], [0.7, 0.8, 0.9]
     found = compare({"neat": low, "single": middle, "all": high})
     assert math.isnan(found["neat"].p)
     assert math.isnan(found["neat"].a12)
-    alone = [mann_whitney_p(arm, low) for arm in (middle, high)]
+    alone = [mann_whitney_p(variant, low) for variant in (middle, high)]
     assert [found["single"].p, found["all"].p] == holm(alone)
     assert found["all"].p == pytest.approx(2 * 0.1)
     assert (found["single"].a12, found["all"].a12) == (pytest.approx(6 / 9), 1.0)
     assert (found["all"].runs, found["all"].mean) == (3, pytest.approx(0.8))
 
 
-def test_an_untrained_arm_has_an_effect_size_but_costs_the_others_no_power() -> None:
-    arms = {"neat": [0.1, 0.2, 0.3], "exneat": [0.7, 0.8, 0.9], "random": [0.0]}
-    found = compare(arms, untrained=("random",))
+def test_an_untrained_variant_has_an_effect_size_but_costs_the_others_no_power() -> None:
+    variants = {"neat": [0.1, 0.2, 0.3], "exneat": [0.7, 0.8, 0.9], "random": [0.0]}
+    found = compare(variants, untrained=("random",))
     assert found["exneat"].p == pytest.approx(0.1)
     assert math.isnan(found["random"].p)
     assert found["random"].a12 == 0.0
 
 
-def test_arms_without_runs_can_be_compared() -> None:
+def test_variants_without_runs_can_be_compared() -> None:
     found = compare({"neat": [], "exneat": [0.5, 0.6], "all": []})
     assert (found["neat"].runs, found["exneat"].runs) == (0, 2)
-    for arm in ("exneat", "all"):
-        assert math.isnan(found[arm].p)
-        assert math.isnan(found[arm].a12)
+    for variant in ("exneat", "all"):
+        assert math.isnan(found[variant].p)
+        assert math.isnan(found[variant].a12)
     assert math.isnan(found["all"].mean)
     assert compare({}) == {}

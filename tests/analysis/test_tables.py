@@ -27,7 +27,7 @@ def plan(columns: Mapping[str, Column], *rows: TableRow, note: str = "") -> Tabl
 
 def built_csv(directory: Path, study: Study, columns: Mapping[str, Column], *rows: TableRow) -> pd.DataFrame:
     table = build_table(plan(columns, *rows), {"track": study}, directory / "report")
-    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str}).set_index(["arm", "quantity"])
+    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str}).set_index(["variant", "quantity"])
 
 
 def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -
     )
     table = build_table(plan(PLAIN, *rows), {"track": study}, tmp_path / "report")
     by_place = {row[1:3]: row for row in table.rows}
-    assert [row[1:3] for row in table.rows] == [(arm, q) for arm in ("NEAT", "ExNEAT") for q in PLAIN]
+    assert [row[1:3] for row in table.rows] == [(variant, q) for variant in ("NEAT", "ExNEAT") for q in PLAIN]
     assert by_place["NEAT", "training"][:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
     assert by_place["NEAT", "training"][6:] == ("0.300", "3", "", "")
     assert by_place["ExNEAT", "training"][3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
@@ -52,7 +52,7 @@ def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -
 
 def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_path: Path) -> None:
     study = finish_all(plan_study(tmp_path))
-    rows = [TableRow("track", "calm", arm) for arm in study.arms]
+    rows = [TableRow("track", "calm", variant) for variant in study.variants]
     table = built_csv(tmp_path, study, PLAIN, *rows)
     assert table.loc[("ExNEAT", "test"), "p_holm"] == pytest.approx(0.1)
     assert table.loc[("random actions", "test"), "mean"] == "0.45"
@@ -60,7 +60,7 @@ def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_p
     assert table.loc[("random actions", "efficiency"), ["mean", "published"]].isna().all()
 
 
-def test_an_arm_that_never_reaches_the_first_one_takes_more_than_all_generations(tmp_path: Path) -> None:
+def test_an_variant_that_never_reaches_the_first_one_takes_more_than_all_generations(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=1)
     finish(run_of(study, "calm", "neat", 0), (0.1, 0.2, 0.9))
     finish(run_of(study, "calm", "exneat", 0), (0.1, 0.2, 0.8))
@@ -80,8 +80,8 @@ def test_efficiency_looks_at_the_mean_of_runs_not_at_single_runs(tmp_path: Path)
 
 def test_csv_keeps_every_digit_where_markdown_rounds(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=1)
-    for arm in ("neat", "exneat"):
-        finish(run_of(study, "calm", arm, 0), (1 / 3,))
+    for variant in ("neat", "exneat"):
+        finish(run_of(study, "calm", variant, 0), (1 / 3,))
     table = build_table(plan(PLAIN), {"track": study}, tmp_path / "report")
     assert "0.3333333333333333," in table.paths[0].read_text()
     assert "| 0.333 |" in table.paths[1].read_text()
@@ -90,8 +90,8 @@ def test_csv_keeps_every_digit_where_markdown_rounds(tmp_path: Path) -> None:
 
 def test_large_figures_are_rounded_to_one_decimal(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=1)
-    for arm, end in (("neat", 812.3456), ("exneat", -3.2111)):
-        finish(run_of(study, "calm", arm, 0), (end,))
+    for variant, end in (("neat", 812.3456), ("exneat", -3.2111)):
+        finish(run_of(study, "calm", variant, 0), (end,))
     table = build_table(plan({"training": Column(of="training")}), {"track": study}, tmp_path / "report")
     assert [row[4] for row in table.rows] == ["812.3", "-3.2"]
 
@@ -113,9 +113,9 @@ def test_the_view_of_the_thesis_takes_the_five_runs_best_on_validation(tmp_path:
     study = plan_study(tmp_path, seeds=7)
     validation = [0.1, 0.9, 0.8, 0.2, 0.7, 0.6, 0.5]
     for seed in range(7):
-        for arm in ("neat", "exneat"):
+        for variant in ("neat", "exneat"):
             levels = {("sensor_noise", 0.3): (float(seed**2), 0.0)}
-            finish(run_of(study, "calm", arm, seed), (0.5,), validation=validation[seed], levels=levels)
+            finish(run_of(study, "calm", variant, seed), (0.5,), validation=validation[seed], levels=levels)
     table = built_csv(tmp_path, study, SWEPT)
     assert table.loc[("NEAT", "noisy"), "best_5"] == pytest.approx((1 + 4 + 16 + 25 + 36) / 5)
     assert float(table.loc[("NEAT", "noisy"), "mean"]) == pytest.approx(13.0)
@@ -126,7 +126,7 @@ def test_with_fewer_than_five_runs_the_view_of_the_thesis_takes_all(tmp_path: Pa
     assert built_csv(tmp_path, study, SWEPT).loc[("NEAT", "noisy"), "best_5"] == pytest.approx(0.4)
 
 
-def test_an_arm_without_a_finished_run_is_an_error_with_the_command(tmp_path: Path) -> None:
+def test_an_variant_without_a_finished_run_is_an_error_with_the_command(tmp_path: Path) -> None:
     study = plan_study(tmp_path)
     finish(run_of(study, "calm", "neat", 0), (0.5,))
     with pytest.raises(MissingRunsError, match=r"(?s)calm.*ExNEAT\n  exneat sweep experiment=track budget=quick"):
@@ -134,7 +134,7 @@ def test_an_arm_without_a_finished_run_is_an_error_with_the_command(tmp_path: Pa
     assert not (tmp_path / "report").exists()
 
 
-def test_an_arm_needs_the_one_that_it_is_compared_with(tmp_path: Path) -> None:
+def test_an_variant_needs_the_one_that_it_is_compared_with(tmp_path: Path) -> None:
     study = plan_study(tmp_path)
     finish(run_of(study, "calm", "exneat", 0), (0.5,))
     with pytest.raises(MissingRunsError, match="NEAT"):
@@ -184,7 +184,7 @@ def test_the_caption_counts_runs_and_warns_of_few(tmp_path: Path) -> None:
     assert "too narrow below 10 runs" in few.caption
     assert few.caption.endswith("A note.")
     assert "not exactly comparable" in few.caption
-    assert "All arms had equal budgets of 400 training episodes per run" in few.caption
+    assert "All variants had equal budgets of 400 training episodes per run" in few.caption
     assert few.caption in few.paths[1].read_text()
     assert "NEAT 10; ExNEAT 10." in enough.caption
     assert "too narrow" not in enough.caption
@@ -219,8 +219,8 @@ def study_of(experiment: str, directory: Path) -> Study:
     content = yaml.safe_load((EXPERIMENTS / f"{experiment}.yaml").read_text(encoding="utf-8"))
     study = plan_study(
         directory,
-        arms={name: str(arm["label"]) for name, arm in content["arms"].items()},
-        baselines=[name for name in content["arms"] if name in ("random", "linear_fusion", "motionless")],
+        variants={name: str(variant["label"]) for name, variant in content["variants"].items()},
+        baselines=[name for name in content["variants"] if name in ("random", "linear_fusion", "motionless")],
         conditions={name: str(condition["label"]) for name, condition in content["conditions"].items()},
         experiment=experiment,
     )

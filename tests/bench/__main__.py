@@ -21,8 +21,8 @@ from tests.bench.evolution_growth import (
     measure_growth_with_threads,
 )
 from tests.bench.evolution_speed import INITIAL_CONNECTIONS, compare_with_stock
-from tests.bench.generation_cost import ARMS, compare_with_physics
-from tests.bench.generation_parts import ARMS as DISSECTED_ARMS
+from tests.bench.generation_cost import VARIANTS, compare_with_physics
+from tests.bench.generation_parts import VARIANTS as DISSECTED_VARIANTS
 from tests.bench.generation_parts import measure_parts
 from tests.bench.grid_worlds import (
     PAPER_ALGORITHMS,
@@ -99,10 +99,12 @@ def _evolution(options: argparse.Namespace) -> Pieces:
 
 
 def _generation(options: argparse.Namespace) -> Pieces:
-    whole: Pieces = {f"whole generations, {arm}": partial(_one, partial(compare_with_physics, arm)) for arm in ARMS}
+    whole: Pieces = {
+        f"whole generations, {variant}": partial(_one, partial(compare_with_physics, variant)) for variant in VARIANTS
+    }
     return whole | {
-        f"parts of a generation, {arm}, {genome} genomes": partial(measure_parts, arm, genome)
-        for arm, genome in product(DISSECTED_ARMS, ("array", "stock"))
+        f"parts of a generation, {variant}, {genome} genomes": partial(measure_parts, variant, genome)
+        for variant, genome in product(DISSECTED_VARIANTS, ("array", "stock"))
     }
 
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import activate, lay_out, memory_size
+from exneat_cli.compiling import compiled
 from exneat_cli.seeding import generator
 from exneat_cli.tasks import RUNNING, AntTask, Simulation
-from exneat_cli.tasks.ant_dynamics import AntWorld, observe, step
-from exneat_cli.tasks.compiling import compiled
-from exneat_cli.tasks.mujoco_library import mj_rnePostConstraint, mj_step
+from exneat_cli.tasks.robots.dynamics import AntWorld, observe, step
+from exneat_cli.tasks.robots.mujoco_library import mj_rnePostConstraint, mj_step
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import TASK, Workload, open_runner
 
@@ -50,7 +50,7 @@ def record(task: AntTask, simulation: Simulation, brains: Brains, b: int) -> Rec
     """Do the episode of brain `b`, step by step, in the world that `simulation` was last reset to."""
     controls = np.zeros((task.max_steps, len(task.actuator_names)))
     memory, terms, totals = np.zeros(memory_size(brains)), np.zeros(len(task.terms)), np.zeros(len(task.terms))
-    simulation.restart(simulation.world)
+    simulation.rewind(simulation.world)
     steps = _record(simulation.world, brains, b, memory, task.observation_size, controls, terms, totals)
     return Recording(controls[:steps].copy(), float(totals[0]), trunk_x(simulation))
 
@@ -96,7 +96,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
 
 
 def _replay_one(simulation: Simulation, recording: Recording) -> float:
-    simulation.restart(simulation.world)
+    simulation.rewind(simulation.world)
     seconds = seconds_of(lambda: replay(simulation.world, recording.controls))
     check_x("replayed", trunk_x(simulation), recording.final_x)
     return seconds

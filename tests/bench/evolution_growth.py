@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.brains import assemble_all
-from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import _Training

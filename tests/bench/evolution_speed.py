@@ -9,8 +9,8 @@ from itertools import pairwise
 import neat
 import numpy as np
 
-from exneat_cli.evolution import EvolutionSettings, from_stock, neat_config, to_stock
-from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.algorithms import EvolutionSettings, from_stock, neat_config, to_stock
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.seeding import stream
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, Brains, RandomActions
+from exneat_cli.compiling import compiled
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import _Training
 from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import AntTask, Simulation
-from exneat_cli.tasks.ant_dynamics import AntWorld, restart
-from exneat_cli.tasks.compiling import compiled
+from exneat_cli.tasks.robots.dynamics import AntWorld, rewind
 from exneat_cli.wiring import Geometry
 from tests.bench.bare_physics import Recording, check_x, record, replay
 from tests.bench.measurement import RATIO, Bar, Row, VerificationError, seconds_of
@@ -25,7 +25,7 @@ from tests.bench.two_threads import usable_cores
 
 _Item = TypeVar("_Item")
 
-ARMS = {
+VARIANTS = {
     "neat": RunSettings(algorithm="neat"),
     "exneat single/none": RunSettings(),
     "exneat all/none": RunSettings(geometry=Geometry("all")),
@@ -64,7 +64,7 @@ class WatchedRunner(Runner):
 @compiled
 def replay_from_start(world: AntWorld, controls: NDArray[np.float64]) -> float:
     """`replay` from where the last reset had put the body; returns the x of the trunk at the end, in metres."""
-    restart(world)
+    rewind(world)
     replay(world, controls)
     return float(world.xpos[world.trunk, 0])
 
@@ -137,16 +137,16 @@ def _replay_one(simulation: Simulation, recording: Recording) -> None:
     check_x("replayed", replay_from_start(simulation.world, recording.controls), recording.final_x)
 
 
-def compare_with_physics(arm: str) -> Row:
+def compare_with_physics(variant: str) -> Row:
     """Wall seconds of whole generations over those of their physics on as many threads, one ratio each.
 
     Args:
-        arm: a key of `ARMS`.
+        variant: a key of `VARIANTS`.
 
     Raises:
         VerificationError: an episode done again was another one.
     """
-    settings, threads = ARMS[arm], usable_cores()
+    settings, threads = VARIANTS[variant], usable_cores()
     walls, ratios, episodes = [], [], []
     with (
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
@@ -162,5 +162,5 @@ def compare_with_physics(arm: str) -> Row:
         f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
         f"{np.median(episodes[1:]):.3f} s of it episodes"
     )
-    name = f"whole Ant generations, {arm} / bare mj_step x 5 + mj_rnePostConstraint, s, {threads} threads"
+    name = f"whole Ant generations, {variant} / bare mj_step x 5 + mj_rnePostConstraint, s, {threads} threads"
     return Row(name, RATIO, ratios[1:], BAR, note)

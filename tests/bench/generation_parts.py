@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from exneat_cli.evolution import Coevolution
+from exneat_cli.algorithms import Coevolution
 from exneat_cli.records import HistoryRow, write_checkpoint, write_history
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings, training
@@ -24,7 +24,7 @@ from tests.bench.two_threads import usable_cores
 
 GENERATIONS = 5
 """That are counted; the one before them compiles."""
-ARMS = {
+VARIANTS = {
     "Ant, neat": RunSettings(algorithm="neat"),
     "Ant, exneat all/full": RunSettings(geometry=Geometry("all"), linkage="full"),
     "hunting, neat": RunSettings(task=Hunting(), algorithm="neat", population=200, episodes=20),
@@ -70,20 +70,20 @@ class Clock:
         return taken
 
 
-def measure_parts(arm: str, genome: str) -> list[Row]:
+def measure_parts(variant: str, genome: str) -> list[Row]:
     """Seconds of each part of a generation.
 
     Args:
-        arm: a key of `ARMS`.
+        variant: a key of `VARIANTS`.
         genome: ``array`` or ``stock``.
     """
-    evolution = dataclasses.replace(ARMS[arm].evolution, genome=genome)
-    settings = dataclasses.replace(ARMS[arm], evolution=evolution, generations=1 + GENERATIONS)
+    evolution = dataclasses.replace(VARIANTS[variant].evolution, genome=genome)
+    settings = dataclasses.replace(VARIANTS[variant], evolution=evolution, generations=1 + GENERATIONS)
     generations = _seconds_by_part(settings)[1:]
     whole = statistics.median(sum(parts.values()) for parts in generations)
     return [
         Row(
-            f"{part}, seconds of a generation of {arm}, {genome} genomes",
+            f"{part}, seconds of a generation of {variant}, {genome} genomes",
             SECONDS,
             [parts[part] for parts in generations],
             None,

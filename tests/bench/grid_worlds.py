@@ -11,10 +11,10 @@ import neat
 import numpy as np
 import yaml
 
+from exneat_cli.algorithms import RECURRENT, ArrayGenome, neat_config, to_stock
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
 from exneat_cli.commands.composition import configuration_directory
-from exneat_cli.evolution import RECURRENT, ArrayGenome, neat_config, to_stock
-from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
@@ -136,7 +136,7 @@ def _pace_of(run: Callable[[], int]) -> Pace:
 
 def _follower(genome: ArrayGenome, task: Task) -> ArrayGenome:
     """A genome like a fully connected one that moves to where the sum of both channels is largest."""
-    wanted = {(-1 - sensor, sector.actuators[0]) for sector in task.sectors for sensor in sector.sensors}
+    wanted = {(-1 - sensor, part.actuators[0]) for part in task.parts for sensor in part.sensors}
     follower = ArrayGenome(genome.key)
     follower.nodes, follower.connections = genome.nodes, genome.connections.copy()
     ends = zip(follower.connections["source"].tolist(), follower.connections["target"].tolist(), strict=True)
@@ -179,7 +179,7 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
         settings = _settings(task, algorithm, "paper", output)
         seconds = seconds_of(partial(train, settings))
         spent = settings.directory.read_manifest()["budget_spent"]
-    name = f"whole training, paper budget, {task}, {settings.arm}, 1 thread, warm compile cache"
+    name = f"whole training, paper budget, {task}, {settings.variant}, 1 thread, warm compile cache"
     note = f"{spent['episodes']:,} training episodes, {spent['env_steps']:,} steps"
     return Row(name, SECONDS, [seconds], PAPER_BAR, note)
 

@@ -10,7 +10,7 @@ import gymnasium
 import neat
 import numpy as np
 
-from exneat_cli.evolution import to_stock
+from exneat_cli.algorithms import to_stock
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.seeding import EpisodeSeeds, generator
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios

@@ -12,7 +12,7 @@ import neat
 import numpy as np
 from numpy.random import SeedSequence
 
-from exneat_cli.evolution import neat_config
+from exneat_cli.algorithms import neat_config
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import generator, training_episodes
 from exneat_cli.tasks import AntTask

@@ -6,9 +6,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from exneat_cli.algorithms import EvolutionSettings, neat_config, to_stock
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
-from exneat_cli.evolution import EvolutionSettings, neat_config, to_stock
-from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import RunSettings

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import neat
 import numpy as np
 
+from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, neat_config
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import Brain, assemble
-from exneat_cli.evolution import ArrayGenome, EvolutionSettings, neat_config
-from exneat_cli.evolution.subpopulation import Subpopulation
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import AntTask

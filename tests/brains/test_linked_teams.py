@@ -10,11 +10,11 @@ import neat
 import numpy as np
 import pytest
 
+from exneat_cli.algorithms import EvolutionSettings, from_stock, neat_config, to_stock
+from exneat_cli.algorithms.neat.stock_genome import HomologousGenome
 from exneat_cli.brains import Brain, assemble, linear_fusion, motionless
 from exneat_cli.brains.brain import Brains, activate, lay_out, memory_size
-from exneat_cli.evolution import EvolutionSettings, from_stock, neat_config, to_stock
-from exneat_cli.evolution.stock_genome import HomologousGenome
-from exneat_cli.tasks import AntTask, Sector
+from exneat_cli.tasks import AntTask, Part
 from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_wiring
 
 STEPS = 50
@@ -127,7 +127,7 @@ def actions_of(brains: Brains, b: int, observations: np.ndarray) -> np.ndarray:
 
 
 def busy(settings: EvolutionSettings, **changes: object) -> EvolutionSettings:
-    rates = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.5)
+    rates = dict.fromkeys(("node_add_prob", "node_delete_prob", "conn_add_prob", "conn_delete_prob"), 0.5)
     return EvolutionSettings(**{**vars(settings), **rates, **changes})
 
 
@@ -143,11 +143,11 @@ def test_linked_ant_teams_equal_the_reference(ant_settings: EvolutionSettings, l
 
 
 class Cross:
-    """Four sectors with two sensors and one actuator each, like the grid worlds'."""
+    """Four parts with two sensors and one actuator each, like the grid worlds'."""
 
     name = "cross"
-    sectors = tuple(
-        Sector(name, (2 * k, 2 * k + 1), (k,), position)
+    parts = tuple(
+        Part(name, (2 * k, 2 * k + 1), (k,), position)
         for k, (name, position) in enumerate(
             {"left": (-1.0, 0.0), "right": (1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)}.items()
         )
@@ -159,7 +159,7 @@ class Cross:
 
 @pytest.mark.parametrize("linkage", ["none", "output", "hidden"])
 def test_linked_recurrent_teams_equal_the_reference(grid_settings: EvolutionSettings, linkage: str) -> None:
-    settings = busy(grid_settings, activation="tanh", bias_sd=0.5, weight_sd=0.5)
+    settings = busy(grid_settings, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
     for seed, geometry in enumerate(["single", "all", "all", "single"]):
         plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
         assert_equal_to_reference(plan, random_team(plan, settings, seed), feed_forward=False, seed=seed)
@@ -168,10 +168,10 @@ def test_linked_recurrent_teams_equal_the_reference(grid_settings: EvolutionSett
 def test_hidden_nodes_that_were_deleted_are_read_as_zero(ant_settings: EvolutionSettings) -> None:
     plan = plan_wiring(AntTask(), "exneat", Geometry("single"), "hidden", Wiring(), hidden=4)
     genomes = random_team(plan, ant_settings, 3)
-    sector_genome = genomes[0]
+    part_genome = genomes[0]
     for key in (2, 3, 4, 5):
-        sector_genome.nodes.pop(key, None)
-        sector_genome.connections = {ends: gene for ends, gene in sector_genome.connections.items() if key not in ends}
+        part_genome.nodes.pop(key, None)
+        part_genome.connections = {ends: gene for ends, gene in part_genome.connections.items() if key not in ends}
     assert_equal_to_reference(plan, genomes, feed_forward=True, seed=0)
 
 
@@ -182,7 +182,7 @@ def test_the_motionless_brain_holds_every_actuator_at_zero() -> None:
 
 def brains_of_many_sizes(settings: EvolutionSettings) -> list[Brain]:
     """Feed-forward and recurrent teams, linked and not, and rules, all for the same body."""
-    brains = [motionless(8, np.arange(4.0)), linear_fusion(8, 4, Cross.sectors)]
+    brains = [motionless(8, np.arange(4.0)), linear_fusion(8, 4, Cross.parts)]
     for feed_forward in (True, False):
         for seed, (geometry, linkage) in enumerate([("single", "hidden"), ("all", "none"), ("all", "output")]):
             plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
@@ -192,7 +192,7 @@ def brains_of_many_sizes(settings: EvolutionSettings) -> list[Brain]:
 
 
 def test_a_brain_among_many_of_other_sizes_does_exactly_what_it_does_alone(grid_settings: EvolutionSettings) -> None:
-    settings = busy(grid_settings, activation="tanh", bias_sd=0.5, weight_sd=0.5)
+    settings = busy(grid_settings, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
     brains = brains_of_many_sizes(settings)
     assert len({brain.size for brain in brains}) > 4
     assert {brain.recurrent for brain in brains} == {True, False}

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from neat.genes import DefaultConnectionGene, DefaultNodeGene
 
+from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, from_stock, neat_config, to_stock
 from exneat_cli.brains import assemble
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import ArrayGenome, EvolutionSettings, from_stock, neat_config, to_stock
 from exneat_cli.wiring import Module, Pin, Plan
 
 INPUTS, HIDDEN, OUTPUTS = 5, 3, 3
@@ -53,8 +53,8 @@ def random_genome(seed: int, config: neat.Config, mutations: int) -> ArrayGenome
 
 
 def wild(settings: EvolutionSettings) -> EvolutionSettings:
-    rates = {"node_add": 0.6, "node_delete": 0.4, "connection_add": 0.6, "connection_delete": 0.4}
-    changes = {**rates, "genome": "stock", "weight_sd": 1.0, "bias_sd": 1.0}
+    rates = {"node_add_prob": 0.6, "node_delete_prob": 0.4, "conn_add_prob": 0.6, "conn_delete_prob": 0.4}
+    changes = {**rates, "genome": "stock", "weight_init_stdev": 1.0, "bias_init_stdev": 1.0}
     return EvolutionSettings(**{**vars(settings), **changes})  # type: ignore[arg-type]
 
 
@@ -82,8 +82,16 @@ def test_feed_forward_outputs_equal_neat_pythons(ant_settings: EvolutionSettings
 
 @pytest.mark.parametrize("activation", ["tanh", "relu", "sigmoid", "identity"])
 def test_recurrent_outputs_equal_neat_pythons(ant_settings: EvolutionSettings, activation: str) -> None:
-    changes = {"activation": activation, "feed_forward": False, "initial_connection": "full_direct"}
-    settings = EvolutionSettings(**{**vars(wild(ant_settings)), **changes, "weight_sd": 0.3, "bound": 1.0})
+    changes = {"activation_default": activation, "feed_forward": False, "initial_connection": "full_direct"}
+    settings = EvolutionSettings(
+        **{
+            **vars(wild(ant_settings)),
+            **changes,
+            "weight_init_stdev": 0.3,
+            "weight_max_value": 1.0,
+            "bias_max_value": 1.0,
+        }
+    )
     config = neat_config(settings, 10, (INPUTS, HIDDEN, OUTPUTS))
     cyclic = 0
     for seed in range(75):

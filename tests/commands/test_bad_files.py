@@ -148,7 +148,7 @@ def test_a_pipe_in_the_directory_is_refused_instead_of_waited_for(
 
 EXPERIMENT = """claim: It works with mine.
 settings: {task: track_maze, algorithm: random}
-arms: {random: {label: random, settings: {}}}
+variants: {random: {label: random, settings: {}}}
 conditions: {clean: {label: clean, settings: {}}}
 runs: {smoke: 1}
 """

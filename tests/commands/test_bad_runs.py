@@ -64,14 +64,14 @@ def as_directory(run: RunDirectory) -> None:
 
 MANIFESTS = {
     "empty": (lambda run: run.manifest.write_bytes(b""), ["manifest.json: expected JSON"]),
-    "latin": (lambda run: run.manifest.write_bytes(b'{"arm": "\xe4"}'), ["manifest.json:1: expected UTF-8"]),
+    "latin": (lambda run: run.manifest.write_bytes(b'{"variant": "\xe4"}'), ["manifest.json:1: expected UTF-8"]),
     "deep": (lambda run: run.manifest.write_text("[" * 100_000), ["manifest.json: ", "nested too deeply"]),
     "twice": (lambda run: run.manifest.write_text('{"a": 1, "a": 2}'), ["manifest.json: ", "'a' comes twice"]),
     "nan": (lambda run: run.manifest.write_text('{"seed": NaN}'), ["manifest.json: ", "NaN is no number"]),
     "directory": (as_directory, ["manifest.json: ", "a directory"]),
     "status": (manifest_with(status="\x1b[31mdone"), ["manifest.json: damaged: status: expected one of running"]),
     "seed": (manifest_with(seed=-1), ["manifest.json: damaged: seed: expected"]),
-    "arm": (manifest_with(arm="\x1b[31m"), ["manifest.json: damaged: arm: expected printable text"]),
+    "variant": (manifest_with(variant="\x1b[31m"), ["manifest.json: damaged: variant: expected printable text"]),
     "result": (manifest_with(result=[1]), ["manifest.json: damaged: result: expected a section"]),
     "figures": (manifest_with(result={"champion": {}}), ["manifest.json: damaged: result.champion.fitness_mean"]),
 }
@@ -89,7 +89,10 @@ OTHERS = {
     "no_champion": (lambda run: run.champion.unlink(), ["champion.json: could not be read"]),
     "pipe": (as_pipe, ["champion.json: could not be read", "a pipe"]),
     "champion_field": (champion_with("wurst", value=1), ["champion.json: damaged: wurst: unknown field"]),
-    "champion_arm": (champion_with("arm", value="random"), ["champion.json: expected a champion of neat, got random"]),
+    "champion_variant": (
+        champion_with("variant", value="random"),
+        ["champion.json: expected a champion of neat, got random"],
+    ),
     "champion_pin": (
         champion_with("plan", "modules", 0, "pins", 0, "index", value=10**13),
         ["champion.json: damaged: plan.modules[0].pins[0].index: expected a whole number"],

@@ -27,8 +27,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return output / "track_maze"
 
 
-def rows_of(runs: Path, arm: str) -> list[RobustnessRow]:
-    (directory,) = runs.glob(f"{arm}-*")
+def rows_of(runs: Path, variant: str) -> list[RobustnessRow]:
+    (directory,) = runs.glob(f"{variant}-*")
     return read_robustness(RunDirectory(directory).robustness)
 
 
@@ -38,8 +38,8 @@ def evaluate(*arguments: str) -> int:
 
 def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
-    for arm in ("neat", "random", "motionless", "linear_fusion"):
-        rows = rows_of(runs, arm)
+    for variant in ("neat", "random", "motionless", "linear_fusion"):
+        rows = rows_of(runs, variant)
         assert [row.level for row in rows if row.parameter == "gap"] == [0, 1, 2, 3, 4, 5]
         assert len([row for row in rows if row.parameter == "sensor_noise"]) == 11
         assert {row.episodes for row in rows if row.parameter != "none"} == {3}
@@ -68,8 +68,8 @@ def test_rows_with_another_number_of_episodes_stand_beside_those_that_are_there(
 def test_without_noise_fusion_is_perfect_and_standing_still_gets_a_quarter(runs: Path) -> None:
     assert evaluate(f"run={runs}/*", "sweep=sensor_noise", "sweep.levels=[0]") == 0
     clean = {
-        arm: next(row for row in rows_of(runs, arm) if (row.parameter, row.level) == ("sensor_noise", 0.0))
-        for arm in ("motionless", "linear_fusion")
+        variant: next(row for row in rows_of(runs, variant) if (row.parameter, row.level) == ("sensor_noise", 0.0))
+        for variant in ("motionless", "linear_fusion")
     }
     assert clean["linear_fusion"].fitness_mean == 1.0
     assert clean["motionless"].fitness_mean == 0.25

@@ -95,7 +95,7 @@ def test_an_experiment_of_the_users_own_gets_figures_and_a_comparison(tmp_path: 
     own = {
         "claim": "It works with mine.",
         "settings": {"task": "hunting"},
-        "arms": {
+        "variants": {
             "one": {"label": "one", "settings": {"algorithm": "neat"}},
             "four": {"label": "four", "settings": {"geometry": "all"}},
         },
@@ -137,13 +137,13 @@ def test_bad_input_is_refused_in_three_lines_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_every_condition_and_arm_of_the_catalogue_is_one_of_its_experiment() -> None:
+def test_every_condition_and_variant_of_the_catalogue_is_one_of_its_experiment() -> None:
     experiments = {name: read_experiment(name) for name in experiment_names()}
     for artefact in CATALOGUE.values():
         for part in getattr(artefact, "panels", ()) or getattr(artefact, "rows", ()):
             experiment = experiments[part.experiment]
             assert part.condition in experiment.conditions
-            assert part.arm is None or part.arm in experiment.arms
+            assert part.variant is None or part.variant in experiment.variants
             if getattr(part, "sweep", None):
                 assert part.sweep in experiment.conditions[part.condition].sweeps
-            assert set(getattr(artefact, "arms", ())) <= set(experiment.arms)
+            assert set(getattr(artefact, "variants", ())) <= set(experiment.variants)

@@ -16,7 +16,7 @@ from exneat_cli.records import RunDirectory, read_robustness
 SMALL = {
     "claim": "Modules beat one network.",
     "settings": {"task": "track_maze"},
-    "arms": {
+    "variants": {
         "neat": {"label": "NEAT", "settings": {"algorithm": "neat"}},
         "exneat": {"label": "ExNEAT", "settings": {"geometry": "custom", "geometry.vector": [0, 0, 1, 1]}},
     },
@@ -132,25 +132,40 @@ def test_experiments_have_ten_runs_on_paper_and_three_when_quick() -> None:
 
 
 BAD_FILES = [
-    ({"arms": {}}, "arms: expected at least one entry"),
+    ({"variants": {}}, "variants: expected at least one entry"),
     ({"conditions": {}}, "conditions: expected at least one entry"),
-    ({"arms": ["neat"]}, "arms: expected a value of type Mapping"),
-    ({"arms": {"neat": {"label": "NEAT"}}}, "arms.neat: settings is missing"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": [1]}}}, "arms.neat: settings: expected a value of type Mapping"),
-    ({"arms": {"neat": {"label": [1], "settings": {}}}}, "arms.neat: label: expected a value of type str"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "swept": "no"}}}, "arms.neat: swept: expected a value"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "sweeps": []}}}, "arms.neat: sweeps: unknown key"),
-    ({"arms": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {"seed": 3}}}}, "arms.neat.settings.seed: expected another"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {"++seed": 3}}}}, "arms.neat.settings.++seed: expected another"),
+    ({"variants": ["neat"]}, "variants: expected a value of type Mapping"),
+    ({"variants": {"neat": {"label": "NEAT"}}}, "variants.neat: settings is missing"),
+    (
+        {"variants": {"neat": {"label": "NEAT", "settings": [1]}}},
+        "variants.neat: settings: expected a value of type Mapping",
+    ),
+    ({"variants": {"neat": {"label": [1], "settings": {}}}}, "variants.neat: label: expected a value of type str"),
+    (
+        {"variants": {"neat": {"label": "NEAT", "settings": {}, "swept": "no"}}},
+        "variants.neat: swept: expected a value",
+    ),
+    ({"variants": {"neat": {"label": "NEAT", "settings": {}, "sweeps": []}}}, "variants.neat: sweeps: unknown key"),
+    ({"variants": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),
+    (
+        {"variants": {"neat": {"label": "NEAT", "settings": {"seed": 3}}}},
+        "variants.neat.settings.seed: expected another",
+    ),
+    (
+        {"variants": {"neat": {"label": "NEAT", "settings": {"++seed": 3}}}},
+        "variants.neat.settings.++seed: expected another",
+    ),
     ({"settings": {"output": "elsewhere"}}, "settings.output: expected another setting"),
     ({"settings": {"sweep": {"levels": [1]}}}, "settings.sweep: expected another setting"),
     ({"settings": {"hydra.job.name": "x"}}, "settings.hydra.job.name: expected another setting"),
     ({"settings": {"task.gap": datetime.date(2020, 1, 1)}}, "settings.task.gap: expected a word, a number"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {}, "runs": 0}}}, "arms.neat.runs: expected"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {"algorithm": "nead"}}}}, "algorithm=nead: no such option"),
-    ({"arms": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "small, clean, neat: sed: unknown key"),
-    ({"arms": {k: {"label": k, "settings": {"algorithm": "neat"}} for k in "ab"}}, "clean/a/0 and clean/b/0 are the"),
+    ({"variants": {"neat": {"label": "NEAT", "settings": {}, "runs": 0}}}, "variants.neat.runs: expected"),
+    ({"variants": {"neat": {"label": "NEAT", "settings": {"algorithm": "nead"}}}}, "algorithm=nead: no such option"),
+    ({"variants": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "small, clean, neat: sed: unknown key"),
+    (
+        {"variants": {k: {"label": k, "settings": {"algorithm": "neat"}} for k in "ab"}},
+        "clean/a/0 and clean/b/0 are the",
+    ),
     ({"conditions": {"a": {"label": "a", "settings": {"task.gap": 99}}}}, "small, a, exneat: task.gap: expected"),
     ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": "gap"}}}, "sweeps: expected a value of type list"),
     ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": [1]}}}, "conditions.a.sweeps: expected names"),

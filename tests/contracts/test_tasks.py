@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from exneat_cli.algorithms import Coevolution, neat_config
 from exneat_cli.brains import Brain, RandomActions, assemble, linear_fusion, motionless
-from exneat_cli.evolution import Coevolution, neat_config
+from exneat_cli.compiling import with_functions
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.rollouts.episode import Buffers, Conditions, _episodes
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream, training_episodes
 from exneat_cli.tasks import ENDED, RUNNING, TASKS, Task
-from exneat_cli.tasks.compiling import with_functions
 from exneat_cli.wiring import Wiring, plan_wiring
 
 SHORT: dict[str, dict[str, Any]] = {"ant": {"max_steps": 60, "patience": 15}}
@@ -64,7 +64,7 @@ def quite_different_brains(task: Task) -> list[Brain]:
     networks = [assemble(settings.plan, t.genomes, feed_forward=settings.evolution.feed_forward) for t in teams]
     sizes = task.observation_size, len(task.actuator_names)
     failing = motionless(sizes[0], np.full(sizes[1], np.nan))
-    return [linear_fusion(*sizes, task.sectors), failing, *networks, motionless(sizes[0], task.resting_action)]
+    return [linear_fusion(*sizes, task.parts), failing, *networks, motionless(sizes[0], task.resting_action)]
 
 
 def test_a_task_goes_by_its_name_and_is_frozen(task: Task) -> None:
@@ -74,14 +74,14 @@ def test_a_task_goes_by_its_name_and_is_frozen(task: Task) -> None:
         task.name = "other"
 
 
-def test_sensors_and_actuators_of_the_sectors_exist_and_do_not_overlap(task: Task) -> None:
-    places = [*task.sectors, *([task.trunk] if task.trunk else [])]
+def test_sensors_and_actuators_of_the_parts_exist_and_do_not_overlap(task: Task) -> None:
+    places = [*task.parts, *([task.trunk] if task.trunk else [])]
     sensors = [index for place in places for index in place.sensors]
     actuators = [index for place in places for index in place.actuators]
     assert sorted(sensors) == list(range(task.observation_size))
     assert len(set(actuators)) == len(actuators)
     assert set(actuators) <= set(range(len(task.actuator_names)))
-    assert len({sector.name for sector in task.sectors}) == len(task.sectors)
+    assert len({part.name for part in task.parts}) == len(task.parts)
 
 
 def test_sizes_agree_with_one_another(task: Task) -> None:
@@ -145,7 +145,7 @@ def test_a_trace_never_depends_on_what_the_runner_did_before(task: Task, std: fl
             np.testing.assert_array_equal(trace.tiles, expected.tiles)
 
 
-def test_a_restart_takes_the_world_back_to_the_start_that_was_drawn(task: Task) -> None:
+def test_a_rewind_takes_the_world_back_to_the_start_that_was_drawn(task: Task) -> None:
     simulation, rng = task.open(training=True, reset_scale=0.1), np.random.default_rng(2)
     actions = rng.uniform(*task.action_bounds, size=(30, len(task.actuator_names)))
 
@@ -166,7 +166,7 @@ def test_a_restart_takes_the_world_back_to_the_start_that_was_drawn(task: Task) 
         simulation.reset(simulation.world, rng)
         first = live()
         for _ in range(2):
-            simulation.restart(simulation.world)
+            simulation.rewind(simulation.world)
             assert live() == first
 
 
@@ -205,7 +205,7 @@ def test_what_a_brain_receives_lies_within_the_limits_however_strong_the_noise(t
         _episodes,
         "recording",
         reset=simulation.reset,
-        restart=simulation.restart,
+        rewind=simulation.rewind,
         observe=simulation.observe,
         step=simulation.step,
         locate=simulation.locate,

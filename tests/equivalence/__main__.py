@@ -17,7 +17,7 @@ from tests.equivalence.equivalence import MARGIN, Equivalence, compare
 
 FOLDER = Path("outputs") / "equivalence"
 SEEDS = range(1000, 1070)
-"""Never used for a reported comparison of arms."""
+"""Never used for a reported comparison of variants."""
 
 
 def main() -> int:

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 import yaml
 
+from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, neat_config
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.brains.brain import activate, memory_size
 from exneat_cli.commands.composition import configuration_directory
-from exneat_cli.evolution import RECURRENT, Coevolution, EvolutionSettings, neat_config
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import evolve
@@ -24,7 +24,12 @@ XOR_INPUTS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
 XOR_TARGETS = np.array([0.0, 1.0, 1.0, 0.0])
 XOR_PLAN = Plan((Module("body", (0.0, 0.0), 0, (Pin("sensor", 0), Pin("sensor", 1)), 1, 1, (0,)),), 2, 1)
 XOR_SETTINGS = EvolutionSettings(
-    neat_hidden=1, weight_sd=1.0, weight_power=0.5, node_add=0.2, connection_add=0.4, distance_threshold=1.5
+    neat_hidden=1,
+    weight_init_stdev=1.0,
+    weight_mutate_power=0.5,
+    node_add_prob=0.2,
+    conn_add_prob=0.4,
+    compatibility_threshold=1.5,
 )
 XOR_POPULATION = 50
 XOR_GENERATIONS = 15

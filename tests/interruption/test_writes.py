@@ -51,9 +51,9 @@ def test_a_process_is_not_ended_amid_a_write() -> None:
 
 WITH_GENERATORS = """
 import random, signal
-from exneat_cli.evolution import EvolutionSettings
-from exneat_cli.evolution.settings import neat_config
-from exneat_cli.evolution.subpopulation import Subpopulation
+from exneat_cli.algorithms import EvolutionSettings
+from exneat_cli.algorithms.neat.settings import neat_config
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.interruption import Interrupted, handlers
 from exneat_cli.seeding import stream
 

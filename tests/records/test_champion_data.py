@@ -14,9 +14,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.brains.brain import Brain, activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config
 from exneat_cli.records import Champion, read_champion, write_champion
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry, Wiring, plan_wiring
@@ -34,8 +34,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     team = Coevolution(configs, seeds[1:], seeds[0]).ask()[0]
     test = {"fitness_mean": 1.0, "fitness_std": 0.5, "episodes": 3}
     scores = {"training": {"fitness": 1.0}, "validation": {"fitness_mean": 1.0}, "test": test}
-    arm, names = "exneat-lr-full", task.actuator_names
-    champion = Champion(arm, {"name": "ant"}, names, True, plan, tuple(team.genomes), scores)
+    variant, names = "exneat-lr-full", task.actuator_names
+    champion = Champion(variant, {"name": "ant"}, names, True, plan, tuple(team.genomes), scores)
     path = tmp_path_factory.mktemp("sound") / "champion.json"
     write_champion(path, champion)
     assert read_champion(path).plan == plan
@@ -147,7 +147,7 @@ DAMAGES: list[tuple[Place, Any, str]] = [
     (("format",), 2, "format 1, got 2"),
     (("format",), True, "format 1, got True"),
     (("feed_forward",), 1, "feed_forward: expected true or false, got 1"),
-    (("arm",), "\x1b[31mred", "arm: expected a word"),
+    (("variant",), "\x1b[31mred", "variant: expected a word"),
     (("actuators", 0), "a\nb", r"actuators\[0\]: expected a word"),
     (("actuators",), "abcdefgh", "actuators: expected a list"),
     (("task",), [], "task: expected the task's parameters"),
@@ -192,7 +192,7 @@ def test_a_field_that_makes_no_sense_is_named(
         read(tmp_path, changed(sound, place, value))
 
 
-@pytest.mark.parametrize("field", ["arm", "task", "actuators", "feed_forward", "scores", "plan", "genomes"])
+@pytest.mark.parametrize("field", ["variant", "task", "actuators", "feed_forward", "scores", "plan", "genomes"])
 def test_a_field_that_is_missing_is_named(field: str, sound: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(ExneatError, match=f"damaged: {field} is missing"):
         read(tmp_path, {key: value for key, value in sound.items() if key != field})

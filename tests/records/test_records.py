@@ -232,7 +232,7 @@ def test_the_hash_does_not_depend_on_how_a_number_was_typed() -> None:
         {},
         {"format": 2},
         {"format": 1},
-        {"format": 1, "arm": "x", "task": {}, "actuators": [], "plan": {"modules": [1]}},
+        {"format": 1, "variant": "x", "task": {}, "actuators": [], "plan": {"modules": [1]}},
     ],
 )
 def test_a_damaged_champion_is_refused_by_name(tmp_path: Path, content: dict[str, object]) -> None:

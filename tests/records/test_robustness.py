@@ -41,7 +41,14 @@ def test_the_bytes_do_not_depend_on_the_order_of_the_rows(
 
 @pytest.mark.parametrize(
     "text",
-    ["", "arm,run_seed\n", "x\n", ",".join(RobustnessRow._fields) + "\nneat,0,gap,nan,1,0,0,0,0\n", "\x00", "a,b\n1"],
+    [
+        "",
+        "variant,run_seed\n",
+        "x\n",
+        ",".join(RobustnessRow._fields) + "\nneat,0,gap,nan,1,0,0,0,0\n",
+        "\x00",
+        "a,b\n1",
+    ],
 )
 def test_a_damaged_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robustness.csv"

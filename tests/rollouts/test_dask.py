@@ -46,7 +46,7 @@ def _one_cluster_for_all() -> Iterator[None]:
 
 def maze_brains(count: int) -> list[Brain]:
     moving = [motionless(8, np.eye(5)[k % 5]) for k in range(count - 1)]
-    return [linear_fusion(8, 5, MAZE.sectors), *moving]
+    return [linear_fusion(8, 5, MAZE.parts), *moving]
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from exneat_cli.tasks import TASKS, AntTask, Hunting, TrackMaze
 
 
 def test_a_level_gives_what_a_run_trained_with_that_setting_would_see() -> None:
-    task, brain = Hunting(), linear_fusion(8, 5, Hunting().sectors)
+    task, brain = Hunting(), linear_fusion(8, 5, Hunting().parts)
     episodes = shared_episodes("test", 5)
     sweep = Sweep("p_m", "task.p_m", (0.0, 1.0))
     levels = dict(run_levels([brain], task, Noise(0.05), sweep, Executor("serial"), episodes))
@@ -47,7 +47,7 @@ def test_a_level_out_of_range_is_refused_before_the_first_level_runs() -> None:
     task = TrackMaze()
     sweep = Sweep("gap", "task.gap", (0, 99))
     with pytest.raises(ConfigError, match=r"task\.gap"):
-        next(run_levels([linear_fusion(8, 5, task.sectors)], task, Noise(), sweep, Executor("serial"), []))
+        next(run_levels([linear_fusion(8, 5, task.parts)], task, Noise(), sweep, Executor("serial"), []))
 
 
 @pytest.mark.parametrize("levels", [(), (0.1, 0.1), (math.nan,), (math.inf,), ("0.1",), (True,), (None,), (0, 0.0)])

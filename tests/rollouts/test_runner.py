@@ -10,12 +10,13 @@ import neat
 import numpy as np
 import pytest
 
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config, to_stock
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.brains.rules import weighted_sums
-from exneat_cli.evolution import Coevolution, EvolutionSettings, neat_config, to_stock
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.seeding import EpisodeSeeds, generator, shared_episodes, stream, training_episodes
-from exneat_cli.tasks import AntTask, mujoco_library
+from exneat_cli.tasks import AntTask
+from exneat_cli.tasks.robots import mujoco_library
 from exneat_cli.wiring import Geometry, Wiring, plan_wiring
 
 TASK = AntTask(max_steps=200)
@@ -23,7 +24,9 @@ TASK = AntTask(max_steps=200)
 
 def ant_brains(count: int, linkage: str = "full") -> list[Brain]:
     plan = plan_wiring(TASK, "exneat", Geometry("all"), linkage, Wiring(), hidden=4)
-    configs = [neat_config(EvolutionSettings(weight_sd=1.0), count, shape) for shape in plan.subpopulation_shapes]
+    configs = [
+        neat_config(EvolutionSettings(weight_init_stdev=1.0), count, shape) for shape in plan.subpopulation_shapes
+    ]
     seeds = [stream(1, "evolution", index) for index in range(len(configs))]
     teams = Coevolution(configs, seeds, stream(1, "pairing")).ask()
     return [assemble(plan, team.genomes, feed_forward=True) for team in teams]

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from exneat_cli.algorithms import RECURRENT
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import RECURRENT
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train

@@ -41,7 +41,7 @@ def test_random_actions_face_the_test_episodes_with_chance_of_the_runs_own() -> 
 
 
 @pytest.mark.parametrize("algorithm", ["neat", "exneat", "motionless"])
-def test_all_other_arms_face_the_very_same_test_episodes(algorithm: str) -> None:
+def test_all_other_variants_face_the_very_same_test_episodes(algorithm: str) -> None:
     episodes = unseen_episodes(RunSettings(algorithm=algorithm, seed=7), 3)
     draws = [[generator(seed).random() for seed in seeds] for seeds in episodes]
     assert draws == [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]

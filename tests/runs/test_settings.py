@@ -14,7 +14,7 @@ from exneat_cli.wiring import Geometry, Wiring
 
 
 @pytest.mark.parametrize(
-    ("changes", "arm"),
+    ("changes", "variant"),
     [
         ({"algorithm": "neat"}, "neat"),
         ({"algorithm": "random"}, "random"),
@@ -24,8 +24,8 @@ from exneat_cli.wiring import Geometry, Wiring
         ({"geometry": Geometry("custom", (0, 1, 1, 2))}, "exneat-custom0112-none"),
     ],
 )
-def test_an_arm_is_algorithm_geometry_linkage_and_central(changes: dict[str, Any], arm: str) -> None:
-    assert RunSettings(**changes).arm == arm
+def test_an_variant_is_algorithm_geometry_linkage_and_central(changes: dict[str, Any], variant: str) -> None:
+    assert RunSettings(**changes).variant == variant
 
 
 def test_seeds_share_the_hash_in_the_directory_and_everything_else_changes_it() -> None:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import yaml
 
+from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import ACTIVATIONS
 from exneat_cli.records import HistoryRow, RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
@@ -77,7 +77,7 @@ def test_random_actions_are_tested_without_training(tmp_path: Path) -> None:
     assert names == {"manifest.json", "config.yaml", "robustness.csv", "trace.csv"}
     with finished.directory.robustness.open() as file:
         (row,) = csv.DictReader(file)
-    assert (row["arm"], row["parameter"], row["level"], row["episodes"]) == ("random", "none", "0.0", "2")
+    assert (row["variant"], row["parameter"], row["level"], row["episodes"]) == ("random", "none", "0.0", "2")
     assert float(row["fitness_mean"]) == finished.result["champion"]["fitness_mean"]
     assert finished.summary.startswith("No training: on 2 test episodes the baseline earned")
 

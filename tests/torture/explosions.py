@@ -16,13 +16,14 @@ from unittest import mock
 
 import numpy as np
 
+from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.evolution import ACTIVATIONS
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Noise, Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train, training
-from exneat_cli.tasks import TASKS, AntTask, Simulation, ant_gymnasium
+from exneat_cli.tasks import TASKS, AntTask, Simulation
+from exneat_cli.tasks.robots import ant_gymnasium
 from exneat_cli.wiring import Geometry
 from tests.torture.findings import Finding, Mistakes, exactly
 from tests.torture.small_runs import difference, results
@@ -43,7 +44,7 @@ def explode(count: int, seed: int) -> list[Finding]:
     mistakes = Mistakes()
     injected = runs = 0
     for number in range(seed, seed + count):
-        for name, settings in _arms(number):
+        for name, settings in _variants(number):
             injected += _with_networks(name, settings, mistakes)
             runs += 1
         injected += _with_physics(number, mistakes)
@@ -51,20 +52,20 @@ def explode(count: int, seed: int) -> list[Finding]:
         runs += 2
     note = f"{injected} episodes exploded by order"
     return [
-        exactly("runs with explosions", runs, count * (len(_arms(0)) + 2), note),
+        exactly("runs with explosions", runs, count * (len(_variants(0)) + 2), note),
         mistakes.none_of("miscounted episodes, NaN in a file, stray logs, or bytes that depend on the workers"),
     ]
 
 
-def _arms(seed: int) -> list[tuple[str, RunSettings]]:
-    arms = []
+def _variants(seed: int) -> list[tuple[str, RunSettings]]:
+    variants = []
     for task in sorted(TASKS):
         world = AntTask(max_steps=60, patience=20) if task == "ant" else TASKS[task]()
         linkage = "full" if task == "ant" else "output"
         linked = RunSettings(task=world, geometry=Geometry("all"), linkage=linkage, seed=seed, **_SMALL)
-        arms += [(f"{task}, ExNEAT linked", linked)]
-        arms += [(f"{task}, NEAT", RunSettings(task=world, algorithm="neat", seed=seed, **_SMALL))]
-    return arms
+        variants += [(f"{task}, ExNEAT linked", linked)]
+        variants += [(f"{task}, NEAT", RunSettings(task=world, algorithm="neat", seed=seed, **_SMALL))]
+    return variants
 
 
 def _with_networks(name: str, settings: RunSettings, mistakes: Mistakes) -> int:
@@ -134,7 +135,7 @@ def _leaping(chance: random.Random, ordered: list[int]) -> Callable[..., Simulat
             world,
             compiled=False,
             reset=lambda world, rng: start(world, lambda: ant_gymnasium.reset(world, rng)),
-            restart=lambda world: start(world, lambda: ant_gymnasium.restart(world)),
+            rewind=lambda world: start(world, lambda: ant_gymnasium.rewind(world)),
             step=step,
         )
 

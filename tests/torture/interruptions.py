@@ -29,7 +29,7 @@ _SMALL = ["task=track_maze", "geometry=all", "linkage=output", "budget=smoke", "
 _EXPERIMENT = {
     "claim": "Nothing; its jobs are there to be stopped.",
     "settings": {"task": "track_maze", "population": 40, "episodes": 6, "generations": 8},
-    "arms": {
+    "variants": {
         "neat": {"label": "NEAT", "settings": {"algorithm": "neat"}},
         "exneat": {"label": "ExNEAT", "settings": {"geometry": "all", "linkage": "output"}},
     },

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tests.torture.findings import Finding, Mistakes, at_most, exactly, say
 from tests.torture.program import HANGING, Program
-from tests.torture.small_runs import arms, difference, results, rows_of, status_of, the_run, undisturbed
+from tests.torture.small_runs import difference, results, rows_of, status_of, the_run, undisturbed, variants
 
 _SIDE_BY_SIDE = 2
 _INTERVALS = (1, 3)
@@ -25,7 +25,7 @@ _MOMENTS = {"start-up": 1, "training": 4, "a write": 3, "validation": 1, "drawin
 
 @dataclass
 class _Tally:
-    """What one arm, or all, went through."""
+    """What one variant, or all, went through."""
 
     kills: int = 0
     repeated: list[int] = field(default_factory=list)
@@ -44,28 +44,30 @@ class _Tally:
 
 
 def kill_runs(count: int, seed: int) -> list[Finding]:
-    """Kill runs of every arm; returns the figures.
+    """Kill runs of every variant; returns the figures.
 
     Args:
-        count: kills in all; shared among the arms, so that fewer kills than arms leave some out.
+        count: kills in all; shared among the variants, so that fewer kills than variants leave some out.
         seed: of the moments.
     """
-    chosen = arms()
+    chosen = variants()
     random.Random(seed).shuffle(chosen)
     chosen = chosen[:count]
     mistakes, total = Mistakes(), _Tally()
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(_SIDE_BY_SIDE) as pool:
         shares = [len(range(k, count, len(chosen))) for k in range(len(chosen))]
         tasks = [
-            pool.submit(_torment, arm, share, random.Random(f"{seed} {arm[0]}"), Path(folder) / str(k), mistakes)
-            for k, (arm, share) in enumerate(zip(chosen, shares, strict=True))
+            pool.submit(
+                _torment, variant, share, random.Random(f"{seed} {variant[0]}"), Path(folder) / str(k), mistakes
+            )
+            for k, (variant, share) in enumerate(zip(chosen, shares, strict=True))
         ]
         for task in tasks:
             total.add(task.result())
     moments = ", ".join(f"{times} in {moment}" for moment, times in sorted(total.moments.items()))
     most = max(total.repeated, default=0)
     return [
-        exactly("kills -9", total.kills, count, f"{len(chosen)} arms, {total.runs} runs: {moments}"),
+        exactly("kills -9", total.kills, count, f"{len(chosen)} variants, {total.runs} runs: {moments}"),
         mistakes.none_of("differences from the undisturbed runs, or runs that could not go on"),
         at_most(
             "resumes that repeated more than one checkpoint interval",
@@ -76,9 +78,11 @@ def kill_runs(count: int, seed: int) -> list[Finding]:
     ]
 
 
-def _torment(arm: tuple[str, list[str]], kills: int, chance: random.Random, folder: Path, mistakes: Mistakes) -> _Tally:
-    """One arm, run to its end as often as the kills last."""
-    name, arguments = arm
+def _torment(
+    variant: tuple[str, list[str]], kills: int, chance: random.Random, folder: Path, mistakes: Mistakes
+) -> _Tally:
+    """One variant, run to its end as often as the kills last."""
+    name, arguments = variant
     began = time.monotonic()
     expected = undisturbed(arguments, folder / "undisturbed")
     tally = _Tally()

@@ -25,7 +25,7 @@ _UNCOMPARED = ("manifest.json", "config.yaml")
 """They tell when, where and how a run went."""
 
 
-def arms() -> list[tuple[str, list[str]]]:
+def variants() -> list[tuple[str, list[str]]]:
     """Name and settings of NEAT and of linked ExNEAT on every task."""
     found = []
     for task in TASKS:

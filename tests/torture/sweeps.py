@@ -21,7 +21,7 @@ _REPETITIONS = 3
 _EXPERIMENT = {
     "claim": "Nothing; its jobs are there to be stopped.",
     "settings": {"task": "track_maze", "population": 20, "episodes": 2, "generations": 4},
-    "arms": {
+    "variants": {
         "neat": {"label": "NEAT", "settings": {"algorithm": "neat"}},
         "exneat": {"label": "ExNEAT", "settings": {"geometry": "all", "linkage": "output"}},
         "random": {"label": "random", "settings": {"algorithm": "random"}},
@@ -107,7 +107,7 @@ def _stamp(path: Path) -> tuple[int, bytes]:
 def _seconds_per_skipped_job(folder: Path, arguments: list[str]) -> float:
     """How much longer a finished sweep takes to find that out than one with a single job, per job."""
     few = yaml.safe_load(Path(arguments[0].partition("=")[2]).read_text(encoding="utf-8"))
-    few["arms"], few["runs"] = {"neat": few["arms"]["neat"]}, {"smoke": 1}
+    few["variants"], few["runs"] = {"neat": few["variants"]["neat"]}, {"smoke": 1}
     single = folder / "single" / "small.yaml"
     single.parent.mkdir()
     single.write_text(yaml.safe_dump(few))

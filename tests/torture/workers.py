@@ -20,7 +20,7 @@ _SMALL: dict[str, Any] = {"generations": 4, "population": 24, "validation_episod
 
 
 def compare_workers(count: int, seed: int) -> list[Finding]:
-    """Train the same arms under every executor; returns the figures.
+    """Train the same variants under every executor; returns the figures.
 
     Args:
         count: tasks; Ant always comes first.
@@ -40,7 +40,7 @@ def compare_workers(count: int, seed: int) -> list[Finding]:
 
 
 def _compare(settings: RunSettings, mistakes: Mistakes) -> int:
-    """One arm under every executor; returns how many there were."""
+    """One variant under every executor; returns how many there were."""
     expected: dict[str, bytes] = {}
     for executor in _executors():
         with tempfile.TemporaryDirectory() as folder:
@@ -49,8 +49,8 @@ def _compare(settings: RunSettings, mistakes: Mistakes) -> int:
             came = results(Path(folder))
         expected = expected or came
         if differing := difference(came, expected):
-            mistakes.add(f"{settings.task.name} {settings.arm} on {_named(executor)}: {differing} differ")
-    say(f"  {settings.task.name}, {settings.arm}")
+            mistakes.add(f"{settings.task.name} {settings.variant} on {_named(executor)}: {differing} differ")
+    say(f"  {settings.task.name}, {settings.variant}")
     return len(_executors())
 
 

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from exneat_cli.errors import ConfigError
-from exneat_cli.tasks import AntTask, Sector
+from exneat_cli.tasks import AntTask, Part
 from exneat_cli.wiring import Geometry
 
 
-def sectors(count: int) -> tuple[Sector, ...]:
-    return tuple(Sector(f"s{k}", (k,), (k,), (float(k), 0.0)) for k in range(count))
+def parts(count: int) -> tuple[Part, ...]:
+    return tuple(Part(f"s{k}", (k,), (k,), (float(k), 0.0)) for k in range(count))
 
 
 @pytest.mark.parametrize(
@@ -26,13 +26,13 @@ def sectors(count: int) -> tuple[Sector, ...]:
     ],
 )
 def test_named_geometries_on_ant_are_those_of_the_design(name: str, vector: tuple[int, ...]) -> None:
-    assert Geometry(name).subpopulations(AntTask().sectors) == vector
-    assert Geometry(name).subpopulations(AntTask(sector_order="model").sectors) == vector
+    assert Geometry(name).subpopulations(AntTask().parts) == vector
+    assert Geometry(name).subpopulations(AntTask(part_order="model").parts) == vector
 
 
 def test_by_position_fb_pairs_front_legs_and_by_model_order_left_legs() -> None:
     def first_pair(order: str) -> set[str]:
-        legs = AntTask(sector_order=order).sectors
+        legs = AntTask(part_order=order).parts
         vector = Geometry("fb").subpopulations(legs)
         return {leg.name for leg, entry in zip(legs, vector, strict=True) if entry == 0}
 
@@ -46,21 +46,21 @@ def test_custom_vectors_are_renumbered_by_first_appearance_or_refused_for_gaps(v
         with pytest.raises(ConfigError, match="without gaps"):
             Geometry("custom", tuple(vector))
         return
-    numbered = Geometry("custom", tuple(vector)).subpopulations(sectors(len(vector)))
+    numbered = Geometry("custom", tuple(vector)).subpopulations(parts(len(vector)))
     assert [vector.index(entry) for entry in vector] == [numbered.index(entry) for entry in numbered]
     assert list(dict.fromkeys(numbered)) == list(range(len(set(vector))))
 
 
 @given(st.integers(1, 12))
-def test_single_and_all_fit_any_number_of_sectors(count: int) -> None:
-    assert set(Geometry("single").subpopulations(sectors(count))) == {0}
-    assert Geometry("all").subpopulations(sectors(count)) == tuple(range(count))
+def test_single_and_all_fit_any_number_of_parts(count: int) -> None:
+    assert set(Geometry("single").subpopulations(parts(count))) == {0}
+    assert Geometry("all").subpopulations(parts(count)) == tuple(range(count))
 
 
 @pytest.mark.parametrize("name", ["fb", "lr", "cross"])
 def test_leg_geometries_are_refused_without_legs(name: str) -> None:
     with pytest.raises(ConfigError, match="geometry: expected single, all or custom"):
-        Geometry(name).subpopulations(sectors(4))
+        Geometry(name).subpopulations(parts(4))
 
 
 @pytest.mark.parametrize(
@@ -79,6 +79,6 @@ def test_missing_or_superfluous_vectors_are_refused(name: str, vector: tuple[int
         Geometry(name, vector)
 
 
-def test_a_vector_of_the_wrong_length_is_refused_with_the_names_of_the_sectors() -> None:
+def test_a_vector_of_the_wrong_length_is_refused_with_the_names_of_the_parts() -> None:
     with pytest.raises(ConfigError, match="4 entries, one for each of front_left"):
-        Geometry("custom", (0, 1)).subpopulations(AntTask().sectors)
+        Geometry("custom", (0, 1)).subpopulations(AntTask().parts)

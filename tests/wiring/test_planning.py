@@ -45,7 +45,7 @@ def test_a_central_module_adds_one_subpopulation(geometry: str) -> None:
 
 
 def test_peers_come_counter_clockwise_from_the_own_leg() -> None:
-    legs = AntTask().sectors
+    legs = AntTask().parts
     around = ["front_left", "back_left", "back_right", "front_right"]
     for own, leg in enumerate(legs):
         start = around.index(leg.name)
@@ -66,7 +66,7 @@ def test_links_of_a_shared_genome_mean_the_same_at_every_leg() -> None:
         ]
         joints = [AntTask().actuator_names[p.index] for p in module.pins if p.kind == "output" and p.module == 4]
         assert joints[0].startswith("hip")
-        own = AntTask().sectors[names.index(module.name)].actuators
+        own = AntTask().parts[names.index(module.name)].actuators
         assert tuple(p.index for p in module.pins if p.kind == "output" and p.module == 4)[:2] == own
         patterns.add(tuple(peers))
     assert len(patterns) == 1
@@ -139,8 +139,8 @@ def test_algorithms_without_modules_refuse_what_is_about_modules(
 def test_sharers_of_different_widths_are_refused() -> None:
     class Lopsided(AntTask):
         @property
-        def sectors(self):  # type: ignore[no-untyped-def]
-            one, *others = super().sectors
+        def parts(self):  # type: ignore[no-untyped-def]
+            one, *others = super().parts
             return (type(one)(one.name, one.sensors[:-1], one.actuators, one.position), *others)
 
     with pytest.raises(ConfigError, match="sharers of equal widths"):

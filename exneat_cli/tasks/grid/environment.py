@@ -1,0 +1,129 @@
+"""Every grid world as a Gymnasium environment: the same compiled functions, one step at a time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.tasks.grid.maze_dynamics import GOAL_COLUMN, GOAL_ROW
+from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
+from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
+from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field
+from exneat_cli.tasks.grid.world import COLUMN, MOVES, ROW
+from exneat_cli.tasks.task import RUNNING
+
+WORLDS: dict[str, type[TrackMaze] | type[GeneralMaze] | type[Foraging]] = {
+    "exneat/TrackMaze-v0": TrackMaze,
+    "exneat/GeneralMaze-v0": GeneralMaze,
+    "exneat/Foraging-v0": Foraging,
+    "exneat/Hunting-v0": Hunting,
+}
+PIXELS_PER_TILE = 16
+
+
+class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
+    """One grid world.
+
+    Observation, (8,) in [0, 1], and the five actions: `exneat_cli.tasks.grid.world`. Rewards add up to the
+    episode's fitness, all of it at the last step; `info` carries the terms. The step budget belongs to the
+    world, so episodes terminate and are never truncated.
+
+    Args:
+        world: a key of `WORLDS`.
+        render_mode: ``rgb_array`` or ``ansi``.
+        parameters: of the world's dataclass, e.g. ``size=17``.
+
+    Raises:
+        ConfigError: a parameter is out of range.
+    """
+
+    metadata = {  # noqa: RUF012 - Gymnasium declares it without ClassVar
+        "render_modes": ["rgb_array", "ansi"],
+        "render_fps": 4,
+    }
+
+    def __init__(self, world: str, render_mode: str | None = None, **parameters: Any) -> None:
+        self.task = WORLDS[world](**parameters)
+        self.render_mode = render_mode
+        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (self.task.observation_size,), np.float64)
+        self.action_space = gymnasium.spaces.Discrete(len(MOVES))
+        self._simulation = self.task.open(training=False, reset_scale=0.0)
+        self._observation = np.zeros(self.task.observation_size)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Draw a new world from the environment's own generator."""
+        super().reset(seed=seed, options=options)
+        self._simulation.reset(self._simulation.world, self.np_random)
+        return self._observe(), {}
+
+    def step(self, action: np.int64) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        """Move; `action` is an index of `exneat_cli.tasks.grid.world.MOVES`.
+
+        Raises:
+            ValueError: there is no such action.
+        """
+        if not self.action_space.contains(action):
+            raise ValueError(f"action: expected a whole number from 0 to {len(MOVES) - 1}, got {action!r}")
+        terms = np.zeros(len(self.task.terms))
+        values = np.eye(len(MOVES))[action]
+        status = self._simulation.step(self._simulation.world, values, terms)
+        info = dict(zip(self.task.terms, terms.tolist(), strict=True))
+        return self._observe(), float(self.task.fitness_of(terms)), status != RUNNING, False, info
+
+    def render(self) -> Any:
+        """The world as an (N * 16, N * 16, 3) picture or as text.
+
+        Red is channel 1, blue channel 2, black wall, green the agent (A), yellow the goal or free prey (o).
+        """
+        if self.render_mode == "ansi":
+            return _as_text(self._tiles, self._agent, self._targets)
+        if self.render_mode == "rgb_array":
+            return _as_picture(self._tiles, self._agent, self._targets)
+        gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
+        return None
+
+    @property
+    def _tiles(self) -> NDArray[np.float64]:
+        return self.task.tiles(self._simulation.world)
+
+    @property
+    def _agent(self) -> tuple[int, int]:
+        agent = self._simulation.world.grid.agent
+        return int(agent[ROW]), int(agent[COLUMN])
+
+    @property
+    def _targets(self) -> list[tuple[int, int]]:
+        world = self._simulation.world
+        if isinstance(world, Field):
+            return [(int(p[PREY_ROW]), int(p[PREY_COLUMN])) for p in world.prey if p[FREE]]
+        return [(int(world.goal[GOAL_ROW]), int(world.goal[GOAL_COLUMN]))]
+
+    def _observe(self) -> NDArray[np.float64]:
+        self._simulation.observe(self._simulation.world, self._observation)
+        return np.clip(self._observation, *self.task.observation_limits)
+
+
+def _as_text(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]) -> str:
+    signs = np.where(tiles[..., 0] == 1, ".", "#").astype(object)
+    for row, column in targets:
+        signs[row, column] = "o"
+    signs[agent] = "A"
+    return "\n".join("".join(row) for row in signs) + "\n"
+
+
+def _as_picture(
+    tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]
+) -> NDArray[np.uint8]:
+    cues = np.clip(tiles[..., 1:], 0.0, 1.0)
+    colours = np.stack([1.0 - cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - cues[..., 0]], axis=2)
+    colours[tiles[..., 0] == 0] = 0.0
+    for row, column in targets:
+        colours[row, column] = (1.0, 0.85, 0.0)
+    colours[agent] = (0.0, 0.6, 0.2)
+    picture = np.kron(colours, np.ones((PIXELS_PER_TILE, PIXELS_PER_TILE, 1)))
+    return (255 * picture).astype(np.uint8)

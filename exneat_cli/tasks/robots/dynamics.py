@@ -1,0 +1,170 @@
+"""The compiled episode of Ant: reset, rewind, observe, step and locate over MuJoCo's own memory.
+
+Written over index lists and sizes taken from the model, so any legged model fits. Follows Gymnasium's
+Ant-v5 (Farama Foundation, 2024) operation by operation, so that results agree to the last bits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from exneat_cli.compiling import compiled
+from exneat_cli.tasks.robots.mujoco_library import mj_forward, mj_resetData, mj_rnePostConstraint, mj_step
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
+
+STEPS, STUCK_STEPS, WARNINGS = range(3)
+"""Entries of `AntWorld.clock`: steps done, steps without progress, MuJoCo's warnings at the reset."""
+
+
+class AntWorld(NamedTuple):
+    """MuJoCo's memory as NumPy views, and the rules of an episode.
+
+    Attributes:
+        model, data: addresses of the C structures.
+        qpos, qvel, ctrl, xpos, cfrc_ext: views of `mjData`; shapes (nq,), (nv,), (nu,), (nbody, 3), (nbody, 6).
+        warnings: view of MuJoCo's warning counters.
+        initial_qpos, initial_qvel: the pose that a reset perturbs.
+        start_qpos, start_qvel: what it made of it.
+        trunk: body whose height and x position count.
+        substeps, control_period: physics steps per control step, and its length in seconds.
+        reset_scale: half-width of the uniform noise on positions (rad, m), sd of that on velocities.
+        lowest, highest: healthy heights of the trunk in metres.
+        force_limit: contact forces are clipped to [-force_limit, force_limit].
+        healthy_reward, control_weight, contact_weight: weights of the reward terms.
+        max_steps: control steps after which an episode ends.
+        progress, patience: an episode ends after `patience` steps (0: never) without `progress` metres.
+        clock: see `STEPS`, `STUCK_STEPS` and `WARNINGS`.
+        mark: x position (m) that progress is measured from, in an array of one.
+    """
+
+    model: int
+    data: int
+    qpos: NDArray[np.float64]
+    qvel: NDArray[np.float64]
+    ctrl: NDArray[np.float64]
+    xpos: NDArray[np.float64]
+    cfrc_ext: NDArray[np.float64]
+    warnings: NDArray[np.int32]
+    initial_qpos: NDArray[np.float64]
+    initial_qvel: NDArray[np.float64]
+    start_qpos: NDArray[np.float64]
+    start_qvel: NDArray[np.float64]
+    trunk: int
+    substeps: int
+    control_period: float
+    reset_scale: float
+    lowest: float
+    highest: float
+    force_limit: float
+    healthy_reward: float
+    control_weight: float
+    contact_weight: float
+    max_steps: int
+    progress: float
+    patience: int
+    clock: NDArray[np.int64]
+    mark: NDArray[np.float64]
+
+
+@compiled
+def reset(world: AntWorld, rng: Generator) -> None:
+    """Put the body near its initial pose, as Gymnasium's Ant does with the same generator."""
+    for i in range(world.qpos.size):
+        world.start_qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
+    for i in range(world.qvel.size):
+        world.start_qvel[i] = world.initial_qvel[i] + world.reset_scale * rng.standard_normal()
+    rewind(world)
+
+
+@compiled
+def rewind(world: AntWorld) -> None:
+    """Put the body back to where the last reset had put it."""
+    mj_resetData(world.model, world.data)
+    world.clock[STEPS] = 0
+    world.clock[STUCK_STEPS] = 0
+    world.clock[WARNINGS] = np.sum(world.warnings)
+    # Assigning slices would do the same, and take seconds to compile.
+    for i in range(world.qpos.size):
+        world.qpos[i] = world.start_qpos[i]
+    for i in range(world.qvel.size):
+        world.qvel[i] = world.start_qvel[i]
+    mj_forward(world.model, world.data)
+    world.mark[0] = world.xpos[world.trunk, 0]
+
+
+@compiled
+def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
+    """Write positions without x and y, velocities, and clipped contact forces."""
+    k = 0
+    for i in range(2, world.qpos.size):
+        observation[k] = world.qpos[i]
+        k += 1
+    for i in range(world.qvel.size):
+        observation[k] = world.qvel[i]
+        k += 1
+    for body in range(1, world.cfrc_ext.shape[0]):
+        for i in range(world.cfrc_ext.shape[1]):
+            observation[k] = min(max(world.cfrc_ext[body, i], -world.force_limit), world.force_limit)
+            k += 1
+
+
+@compiled
+def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
+    """One control step; `terms` become forward, healthy, control and contact reward of this step."""
+    for i in range(action.size):
+        if not np.isfinite(action[i]):
+            return FAILED
+        world.ctrl[i] = action[i]
+    before = world.xpos[world.trunk, 0]
+    for _ in range(world.substeps):
+        mj_step(world.model, world.data)
+    mj_rnePostConstraint(world.model, world.data)
+    if np.sum(world.warnings) != world.clock[WARNINGS]:
+        return FAILED
+    if not (np.isfinite(world.qpos).all() and np.isfinite(world.qvel).all()):
+        return FAILED
+    height = world.qpos[2]
+    healthy = world.lowest <= height and height <= world.highest
+    _reward(world, action, before, healthy, terms)
+    world.clock[STEPS] += 1
+    if not healthy or world.clock[STEPS] >= world.max_steps or _stuck(world):
+        return ENDED
+    return RUNNING
+
+
+@compiled
+def _reward(world, action, before, healthy, terms):  # type: ignore[no-untyped-def]
+    terms[0] = (world.xpos[world.trunk, 0] - before) / world.control_period
+    terms[1] = world.healthy_reward if healthy else 0.0
+    effort = 0.0
+    for i in range(action.size):
+        effort += action[i] * action[i]
+    terms[2] = -world.control_weight * effort
+    squared = 0.0
+    for body in range(world.cfrc_ext.shape[0]):
+        for i in range(world.cfrc_ext.shape[1]):
+            force = min(max(world.cfrc_ext[body, i], -world.force_limit), world.force_limit)
+            squared += force * force
+    terms[3] = -world.contact_weight * squared
+
+
+@compiled
+def _stuck(world):  # type: ignore[no-untyped-def]
+    x = world.xpos[world.trunk, 0]
+    if x >= world.mark[0] + world.progress:
+        world.mark[0] = x
+        world.clock[STUCK_STEPS] = 0
+    else:
+        world.clock[STUCK_STEPS] += 1
+    return world.patience > 0 and world.clock[STUCK_STEPS] >= world.patience
+
+
+@compiled
+def locate(world: AntWorld, row: NDArray[np.float64]) -> None:
+    """Write x, y and z of the trunk in metres."""
+    for i in range(3):
+        row[i] = world.xpos[world.trunk, i]

@@ -1,0 +1,269 @@
+"""Foraging and hunting: catching, what the agent senses, and how episodes end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from exneat_cli.brains import RandomActions, linear_fusion
+from exneat_cli.rollouts import Executor, Noise, Runner
+from exneat_cli.seeding import shared_episodes, stream
+from exneat_cli.tasks import ENDED, RUNNING, Foraging, Hunting
+from exneat_cli.tasks.grid.prey_dynamics import observe, paint, reset, rewind, step
+from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field
+from exneat_cli.tasks.grid.world import COLUMN, COLUMN_STEPS, MOVES, ROW, ROW_STEPS, STAY
+
+ACTIONS = np.eye(len(MOVES))
+REST = ACTIONS[STAY]
+RIGHT = ACTIONS[MOVES.index("right")]
+
+
+def field_of(task: Foraging, seed: int = 0) -> Field:
+    field: Field = task.open(training=False, reset_scale=0.0).world
+    reset(field, np.random.default_rng(seed))
+    return field
+
+
+def rest(field: Field) -> int:
+    status: int = step(field, REST, np.zeros(1))
+    return status
+
+
+def hide_agent(field: Field) -> None:
+    """Out of everyone's way: on a wall, where no prey can come."""
+    field.grid.agent[ROW], field.grid.agent[COLUMN] = 1, 0
+
+
+def put_prey(field: Field, *tiles: tuple[int, int]) -> None:
+    """Where the prey of a field in which they never move have always been."""
+    field.start[:] = tiles
+    field.places[:] = tiles
+    rewind(field)
+
+
+def signals_of(field: Field) -> np.ndarray:
+    signals = np.zeros_like(field.grid.signals)
+    paint(field, signals)
+    return signals
+
+
+class SlowField:
+    """The rule as it is told: the whole field fades, prey are caught, move and emit, then the agent senses.
+
+    Prey go where and emit what `field` drew for them; nothing else is taken from it.
+    """
+
+    def __init__(self, task: Foraging, field: Field) -> None:
+        self.task, self.keep = task, 1.0 - task.p_c
+        self.ways, self.emitters, self.first_of_second = field.places, field.emitters, field.first_of_second
+        before = np.concatenate([np.zeros_like(field.cues[:1]), field.cues[:-1]])
+        self.emissions = field.cues - self.keep * before
+        self.path = field.grid.path
+        self.signals = np.zeros((2, *self.path.shape))
+        self.agent = (self.path.shape[0] // 2,) * 2
+        self.places = [tuple(place) for place in field.start.tolist()]
+        self.free = [True] * task.n_prey
+        self.steps = 0
+        self.advance()
+
+    def advance(self) -> None:
+        self.signals *= self.keep
+        for k in range(self.task.n_prey):
+            self.catch(k)
+            if not self.free[k]:
+                continue
+            self.places[k] = tuple(self.ways[self.steps, k].tolist())
+            self.catch(k)
+            if not self.free[k]:
+                continue
+            for emitter in np.flatnonzero(self.emitters == k):
+                self.signals[int(emitter >= self.first_of_second)] += self.emissions[self.steps, :, :, emitter]
+
+    def catch(self, k: int) -> None:
+        self.free[k] = self.free[k] and self.places[k] != self.agent
+
+    def sensed(self) -> list[float]:
+        row, column = self.agent
+        sides = [(row + ROW_STEPS[side], column + COLUMN_STEPS[side]) for side in range(4)]
+        return [self.signals[(channel, *tile)] for tile in sides for channel in (0, 1)]
+
+    def step(self, move: int) -> tuple[int, float]:
+        """Status and share of prey caught, or 0 before the end."""
+        tile = self.agent[0] + ROW_STEPS[move], self.agent[1] + COLUMN_STEPS[move]
+        if self.path[tile]:
+            self.agent = tile
+        self.steps += 1
+        for k in range(self.task.n_prey):
+            self.catch(k)
+        if self.steps < self.task.steps and any(self.free):
+            self.advance()
+            if any(self.free):
+                return RUNNING, 0.0
+        return ENDED, self.free.count(False) / self.task.n_prey
+
+    def towards_prey(self) -> int:
+        """The move that comes nearer to the first free prey."""
+        target = self.places[self.free.index(True)] if any(self.free) else self.agent
+        down, right = target[0] - self.agent[0], target[1] - self.agent[1]
+        if abs(down) > abs(right):
+            return MOVES.index("down" if down > 0 else "up")
+        return STAY if right == 0 else MOVES.index("right" if right > 0 else "left")
+
+
+def assert_equal(field: Field, slow: SlowField) -> None:
+    np.testing.assert_allclose(signals_of(field), slow.signals, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(field.prey[:, [PREY_ROW, PREY_COLUMN]], slow.places)
+    np.testing.assert_array_equal(field.prey[:, FREE], slow.free)
+    assert (field.grid.agent[ROW], field.grid.agent[COLUMN]) == slow.agent
+
+
+def live_by_the_rule(task: Foraging, field: Field, moves: list[int] | None) -> int:
+    """Compare at every step; the agent takes `moves` and then rests, or chases prey if there are none.
+
+    Returns:
+        How many prey were caught while others were free.
+    """
+    slow, observation, terms = SlowField(task, field), np.zeros(8), np.full(1, np.nan)
+    status, caught = RUNNING, 0
+    while status == RUNNING:
+        observe(field, observation)
+        np.testing.assert_allclose(observation, slow.sensed(), rtol=0, atol=1e-12)
+        assert_equal(field, slow)
+        caught = slow.free.count(False)
+        move = slow.towards_prey() if moves is None else [*moves, *[STAY] * task.steps][slow.steps]
+        status, share = slow.step(move)
+        assert step(field, ACTIONS[move], terms) == status
+        assert terms[0] == pytest.approx(share)
+    assert_equal(field, slow)
+    return caught
+
+
+@st.composite
+def small_tasks(draw: st.DrawFn) -> Foraging:
+    size = draw(st.integers(3, 7))
+    parameters: dict[str, Any] = {
+        "size": size,
+        "n_prey": draw(st.integers(1, min(8, size**2 - 1))),
+        "steps": draw(st.integers(1, 30)),
+        "p_e": draw(st.floats(0.0, 1.0)),
+        "p_c": draw(st.floats(0.0, 1.0)),
+        "patch_width": draw(st.sampled_from([1, 3, 5])),
+    }
+    if draw(st.booleans()):
+        return Foraging(**parameters)
+    return Hunting(p_m=draw(st.floats(0.0, 1.0)), motion=draw(st.sampled_from(["levy", "brownian"])), **parameters)
+
+
+@given(small_tasks(), st.integers(0, 2**32), st.none() | st.lists(st.integers(0, 4), max_size=30))
+@settings(max_examples=150, deadline=None)
+def test_what_is_looked_up_equals_the_whole_field_that_fades_step_by_step(
+    task: Foraging, seed: int, moves: list[int] | None
+) -> None:
+    field = field_of(task, seed)
+    live_by_the_rule(task, field, moves)
+    rewind(field)
+    live_by_the_rule(task, field, moves)
+
+
+@pytest.mark.parametrize("p_c", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("world", [Foraging, Hunting])
+def test_the_cues_of_prey_caught_midway_fade_as_the_rule_tells(world: type[Foraging], p_c: float) -> None:
+    task = world(p_c=p_c)
+    assert max(live_by_the_rule(task, field_of(task, seed), moves=None) for seed in range(20)) >= 3
+
+
+def test_prey_that_walk_into_the_agent_are_caught_even_before_the_first_step() -> None:
+    # Three tiles a side and prey on all but the centre: some move onto it at the reset.
+    early = 0
+    for seed in range(30):
+        task = Hunting(size=3, n_prey=8, p_m=1.0)
+        field = field_of(task, seed)
+        early += int((field.prey[:, FREE] == 0).sum())
+        live_by_the_rule(task, field, [STAY] * 50)
+    assert early > 0
+
+
+def test_tiles_show_path_and_cues_as_the_agent_senses_them() -> None:
+    task = Foraging()
+    field = field_of(task)
+    tiles = task.tiles(field)
+    np.testing.assert_array_equal(tiles[..., 0], field.grid.path)
+    np.testing.assert_array_equal(np.moveaxis(tiles[..., 1:], 2, 0), signals_of(field))
+
+
+def test_prey_never_move_in_foraging_while_the_episode_goes_on() -> None:
+    field = field_of(Foraging())
+    before = field.prey[:, :2].copy()
+    while rest(field) == RUNNING:
+        np.testing.assert_array_equal(field.prey[:, :2], before)
+
+
+def test_prey_never_leave_the_field_while_the_episode_goes_on() -> None:
+    field = field_of(Hunting(size=4, n_prey=5, p_m=1.0, steps=500))
+    while rest(field) == RUNNING:
+        assert (field.prey[:, :2] >= 1).all()
+        assert (field.prey[:, :2] <= 4).all()
+
+
+def test_foraging_prey_alternate_channels_and_hunting_prey_use_both() -> None:
+    for task, channels in (
+        (Foraging(n_prey=2, p_c=1.0), ([0], [1])),
+        (Hunting(n_prey=2, p_c=1.0, p_m=0.0), ([0, 1],) * 2),
+    ):
+        seeds = (seed for seed in range(1000) if np.abs(np.diff(field_of(task, seed).start, axis=0)).max() > 4)
+        field = field_of(task, next(seeds))
+        hide_agent(field)
+        rest(field)
+        for expected, (row, column) in zip(channels, field.start, strict=True):
+            around = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
+            assert [c for c in (0, 1) if signals_of(field)[c, *around].any()] == expected
+
+
+@pytest.mark.parametrize("p_c", [0.0, 0.3, 1.0])
+def test_a_caught_prey_neither_moves_nor_emits(p_c: float) -> None:
+    field = field_of(Hunting(n_prey=2, p_c=p_c, p_m=1.0))
+    hide_agent(field)
+    field.prey[0, FREE] = 0
+    place, cues = field.prey[0, :2].copy(), field.cues[0, :, :, [0, 2]].copy()
+    for t in range(1, 20):
+        assert rest(field) == RUNNING
+        np.testing.assert_array_equal(field.prey[0, :2], place)
+        others = field.cues[t, :, :, [1, 3]]
+        np.testing.assert_allclose(signals_of(field), others + (1.0 - p_c) ** t * cues, rtol=0, atol=1e-12)
+
+
+def test_stepping_onto_a_prey_catches_it_and_the_last_one_ends_the_episode() -> None:
+    field = field_of(Foraging(n_prey=2))
+    put_prey(field, (5, 6), (5, 7))
+    field.grid.agent[ROW], field.grid.agent[COLUMN] = 5, 5
+    terms = np.zeros(1)
+    assert step(field, RIGHT, terms) == RUNNING
+    assert list(field.prey[:, FREE]) == [0, 1]
+    assert terms[0] == 0.0
+    assert step(field, RIGHT, terms) == ENDED
+    assert terms[0] == 1.0
+
+
+def test_an_episode_lasts_fifty_moves_and_pays_the_share_caught() -> None:
+    field = field_of(Foraging())
+    field.prey[:3, FREE] = 0
+    hide_agent(field)
+    terms, steps = np.zeros(1), 1
+    while step(field, REST, terms) == RUNNING:
+        steps += 1
+    assert steps == 50
+    assert terms[0] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("task", [Foraging(), Hunting()])
+def test_following_the_cues_is_far_better_than_chance(task: Foraging) -> None:
+    seeds = shared_episodes("test", 100)
+    own = [each._replace(actions=stream(0, "random_actions", k)) for k, each in enumerate(seeds)]
+    with Runner(task, Noise(), Executor(), training=False) as runner:
+        fusion = runner.run([linear_fusion(8, 5, task.parts)], seeds)
+        luck = runner.run(RandomActions(*task.action_bounds), own)
+    assert fusion.fitness.mean() > 2.0 * luck.fitness.mean()
