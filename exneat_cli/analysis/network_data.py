@@ -119,18 +119,15 @@ def _links(plan: Plan, known: set[Node]) -> tuple[Link, ...]:
     links = []
     for m, module in enumerate(plan.modules):
         for k, pin in enumerate(module.pins):
-            if pin.kind == "sensor":
+            if pin.is_sensor:
                 continue
-            first = plan.modules[pin.module].outputs if pin.kind == "hidden" else 0
-            links.append(Link((pin.module, first + pin.index), (m, -1 - k), pin.delayed))
+            links.append(Link((pin.module, pin.index), (m, -1 - k), pin.delayed))
     return tuple(link for link in links if link.source in known)
 
 
 def _used(plan: Plan, edges: Iterable[Edge], links: Iterable[Link]) -> frozenset[Node]:
     steps = [(edge.source, edge.target) for edge in edges] + [(link.source, link.target) for link in links]
-    sensors = [
-        (m, -1 - k) for m, module in enumerate(plan.modules) for k, p in enumerate(module.pins) if p.kind == "sensor"
-    ]
+    sensors = [(m, -1 - k) for m, module in enumerate(plan.modules) for k, p in enumerate(module.pins) if p.is_sensor]
     driving = [(m, output) for m, module in enumerate(plan.modules) for output in range(len(module.drives))]
     return frozenset(_reachable(sensors, steps) & _reachable(driving, [(target, source) for source, target in steps]))
 

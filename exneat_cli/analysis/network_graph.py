@@ -197,8 +197,8 @@ def _returning(edge: Edge, layout: Layout, colour: tuple[float, ...], width: flo
 def _draw_nodes(axes: Axes, graph: ChampionGraph, layout: Layout, m: int) -> None:
     module = graph.plan.modules[m]
     pins = [(m, -1 - k) for k in range(len(module.pins))]
-    sensing = [node for node, pin in zip(pins, module.pins, strict=True) if pin.kind == "sensor"]
-    reading = [node for node, pin in zip(pins, module.pins, strict=True) if pin.kind != "sensor"]
+    sensing = [node for node, pin in zip(pins, module.pins, strict=True) if pin.is_sensor]
+    reading = [node for node, pin in zip(pins, module.pins, strict=True) if not pin.is_sensor]
     small = 10.0 if len(pins) > 30 else 22.0
     _scatter(axes, graph, layout, sensing, "o", "white", small)
     _scatter(axes, graph, layout, reading, "s", "#999999", small)
@@ -224,8 +224,8 @@ def _name_pins(axes: Axes, graph: ChampionGraph, layout: Layout, m: int) -> None
     places = [layout.places[m, -1 - k] for k in range(len(module.pins))]
     room = _POINTS * min((b[0] - a[0] for a, b in pairwise(places)), default=1.0)
     turn = 90 if room < _ROOM_TO_STAND else 0
-    for group in pin_groups(module):
-        if module.pins[group[0]].kind == "sensor" and room >= _LEAST_ROOM:
+    for group in pin_groups(graph.plan, module):
+        if module.pins[group[0]].is_sensor and room >= _LEAST_ROOM:
             for k in group:
                 x, y = places[k]
                 axes.text(x, y - 0.06, str(module.pins[k].index), fontsize=5.5, rotation=turn, ha="center", va="top")
@@ -237,11 +237,11 @@ def _name_pins(axes: Axes, graph: ChampionGraph, layout: Layout, m: int) -> None
 def _words(graph: ChampionGraph, module: Module, group: list[int]) -> str:
     """What a group of inputs reads, in two lines, as groups of links are narrow."""
     pins = [module.pins[k] for k in group]
-    if pins[0].kind == "sensor":
+    if pins[0].is_sensor:
         return "sensors, by index"
     sources = {pin.module for pin in pins}
     whose = graph.plan.modules[sources.pop()].name.replace("_", " ") if len(sources) == 1 else "others"
-    return f"{'outputs' if pins[0].kind == 'output' else 'hidden'} of\n{whose}"
+    return f"{'outputs' if graph.plan.kind_of(pins[0]) == 'output' else 'hidden'} of\n{whose}"
 
 
 def _name_outputs(axes: Axes, graph: ChampionGraph, layout: Layout, m: int) -> None:

@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from exneat_cli.analysis.network_data import ChampionGraph, Node
-from exneat_cli.wiring import Module
+from exneat_cli.wiring import Module, Plan
 
 GAP = 0.3
 """Between boxes; links run there."""
@@ -70,7 +70,7 @@ def natural_size(graph: ChampionGraph) -> tuple[float, float]:
     """Width and height at which everything can be told apart, within what fits on a screen."""
     rows = _rows(page_direction(graph.plan.modules))
     widest = max(len(row) for row in rows)
-    room = max(max(PIN * len(pin_slots(m)), ACTUATOR * len(m.drives)) for m in graph.plan.modules)
+    room = max(max(PIN * len(pin_slots(graph.plan, m)), ACTUATOR * len(m.drives)) for m in graph.plan.modules)
     layers = max(_deepest(graph, m) for m in range(len(graph.plan.modules))) + 1
     width = widest * (2 * SIDE + room) + (widest - 1) * GAP
     height = len(rows) * (TITLE + OUTPUT_NAMES + INPUT_NAMES + LAYER * layers) + (len(rows) - 1) * GAP
@@ -86,17 +86,17 @@ def lay_out(graph: ChampionGraph, width: float, height: float) -> Layout:
     return Layout(width, height, tuple(boxes), places)
 
 
-def pin_slots(module: Module) -> list[int | None]:
+def pin_slots(plan: Plan, module: Module) -> list[int | None]:
     """The module's pins from left to right, with an empty slot between groups."""
     slots: list[int | None] = []
-    for group in pin_groups(module):
+    for group in pin_groups(plan, module):
         slots += [None, *group] if slots else group
     return slots
 
 
-def pin_groups(module: Module) -> list[list[int]]:
+def pin_groups(plan: Plan, module: Module) -> list[list[int]]:
     """The module's pins in their order; neighbours of one kind make a group."""
-    return [list(group) for _, group in groupby(range(len(module.pins)), key=lambda k: module.pins[k].kind)]
+    return [list(group) for _, group in groupby(range(len(module.pins)), key=lambda k: plan.kind_of(module.pins[k]))]
 
 
 def depths(hidden: Sequence[int], connections: Iterable[tuple[int, int]]) -> dict[int, int]:
@@ -165,7 +165,7 @@ def _places(graph: ChampionGraph, m: int, box: Box) -> dict[Node, tuple[float, f
     module = graph.plan.modules[m]
     bottom = box.y + INPUT_NAMES
     top = box.y + box.height - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
-    slots = pin_slots(module)
+    slots = pin_slots(graph.plan, module)
     spread = _spread(box, len(slots))
     places = {(m, -1 - k): (spread[slot], bottom) for slot, k in enumerate(slots) if k is not None}
     found = _depths_of(graph, m)

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.analysis.figures import new_figure, save_figure, style, tick_levels
-from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory
+from exneat_cli.records import HISTORY_COLUMNS, UNPERTURBED, RobustnessRow, RunDirectory
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
@@ -28,7 +28,7 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
         run: whose history.csv is drawn.
         fitness_name: label of the vertical axis, e.g. ``forward reward``.
     """
-    history = read_csv(run.history, HistoryRow._fields)
+    history = read_csv(run.history, HISTORY_COLUMNS)
     curves = {
         "best_so_far": ("best so far", "#222222", 1.2, "--"),
         "best_fitness": ("best of the generation", "#0072b2", 1.8, "-"),

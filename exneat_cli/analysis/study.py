@@ -15,7 +15,7 @@ import pandas as pd
 
 from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory
+from exneat_cli.records import DONE, HISTORY_COLUMNS, RobustnessRow, RunDirectory
 
 
 class MissingRunsError(ExneatError):
@@ -110,7 +110,7 @@ class Study:
     def history(self, condition: str, variant: str) -> pd.DataFrame:
         """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
         return _stacked(
-            [(run, read_csv(run.directory.history, HistoryRow._fields)) for run in self.of(condition, variant)]
+            [(run, read_csv(run.directory.history, HISTORY_COLUMNS)) for run in self.of(condition, variant)]
         )
 
     def robustness(self, condition: str, variant: str) -> pd.DataFrame:

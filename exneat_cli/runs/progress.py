@@ -59,10 +59,10 @@ class Lines:
     def generation(self, row: HistoryRow) -> None:
         """Print every tenth part of the run, and the last generation."""
         interval = max(1, self._generations // 10)
-        if row.generation % interval == 0 or row.generation == self._generations:
+        if row["generation"] % interval == 0 or row["generation"] == self._generations:
             self.say(
-                f"generation {row.generation}/{self._generations}  {_figures(row)}"
-                f"  {row.wall_seconds / row.generation:.2f} s each"
+                f"generation {row['generation']}/{self._generations}  {_figures(row)}"
+                f"  {row['wall_seconds'] / row['generation']:.2f} s each"
             )
 
     def stop(self) -> None:
@@ -99,7 +99,7 @@ class Bar:
 
     def generation(self, row: HistoryRow) -> None:
         """Move on by one."""
-        self._bar.update(self._task, completed=row.generation, figures=_figures(row))
+        self._bar.update(self._task, completed=row["generation"], figures=_figures(row))
 
     def stop(self) -> None:
         """Leave the bar as it is."""
@@ -112,4 +112,4 @@ def progress_for_terminal() -> Progress:
 
 
 def _figures(row: HistoryRow) -> str:
-    return f"best {row.best_fitness:.4g}  mean {row.mean_fitness:.4g}  best so far {row.best_so_far:.4g}"
+    return f"best {row['best_fitness']:.4g}  mean {row['mean_fitness']:.4g}  best so far {row['best_so_far']:.4g}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from exneat_cli.brains import Brain, RandomActions
+from exneat_cli.brains import Brain, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.interruption import finishing
 from exneat_cli.records import (
@@ -22,9 +22,8 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import Score, baseline, robustness_row, score_all, unseen_episodes
+from exneat_cli.runs.scores import Score, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
-from exneat_cli.wiring import UNTRAINED
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
@@ -150,7 +149,8 @@ def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
 
 
 def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:
-    if settings.algorithm not in UNTRAINED:
+    rule = settings.algorithm.rule
+    if rule is None:
         champion = read_champion(directory.champion)
         if champion.variant != settings.variant:
             raise ExneatError(
@@ -159,4 +159,5 @@ def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] |
         if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
             raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
         return [champion.brain()]
-    return baseline(settings.task, settings.algorithm)
+    acting = acting_by_rule(rule, settings.task)
+    return acting if isinstance(acting, RandomActions) else [acting]

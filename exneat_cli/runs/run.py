@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from exneat_cli.algorithms import Team
-from exneat_cli.brains import Brain, RandomActions, assemble, motionless
+from exneat_cli.brains import Brain, acting_by_rule, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import before_the_end, heeding
 from exneat_cli.records import (
@@ -39,11 +39,10 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Runner, Trace, keep_clusters
 from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import baseline, robustness_row, score_all, score_brains, summary_sentence, unseen_episodes
+from exneat_cli.runs.scores import robustness_row, score_all, score_brains, summary_sentence, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Trained, evolve
 from exneat_cli.seeding import STREAMS, shared_episodes
-from exneat_cli.wiring import UNTRAINED
 
 
 @dataclass(frozen=True)
@@ -162,8 +161,7 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
 
 def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     progress.start(directory.path.name, settings.generations)
-    _tell_simulator(settings, directory, progress)
-    if settings.algorithm in UNTRAINED:
+    if settings.algorithm.rule:
         return _test_baseline(settings, directory)
 
     def report(history: list[HistoryRow]) -> None:
@@ -177,21 +175,14 @@ def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> d
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
         trained = evolve(settings, runner, report, checkpoints=checkpoints, say=progress.say, save=save)
     last = trained.history[-1]
-    spent = {"episodes": last.episodes, "env_steps": last.env_steps, "wall_seconds": last.wall_seconds}
+    spent = {key: last[key] for key in ("episodes", "env_steps", "wall_seconds")}
     directory.update_manifest(budget_spent=spent)
-    progress.say(f"validating {len(trained.hall_of_fame)} teams of the hall of fame")
+    progress.say(f"validating {len(trained.candidates)} teams of the hall of fame")
     return _choose_champion(settings, directory, trained)
 
 
-def _tell_simulator(settings: RunSettings, directory: RunDirectory, progress: Progress) -> None:
-    compiled = settings.task.open(training=False, reset_scale=settings.noise.reset_scale).compiled
-    directory.update_manifest(simulator="compiled" if compiled else "gymnasium")
-    if not compiled:
-        progress.say("MuJoCo cannot be called from compiled code here: running over Gymnasium, which is slower")
-
-
 def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Trained) -> dict[str, Any]:
-    entries = trained.hall_of_fame
+    entries = trained.candidates
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         brains = [_compile(settings, entry.team) for entry in entries]
         validation = score_brains(runner, brains, "validation", settings.validation_episodes)
@@ -208,17 +199,18 @@ def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Tr
     write_champion(directory.champion, _champion(settings, entries[best].team, scores))
     _write_trace(settings, directory, trace)
     names = ("champion", "standing_still", "first_generation")
-    training = {"training": trained.history[-1].best_so_far, "validation": validation[best].fitness_mean}
+    training = {"training": trained.history[-1]["best_so_far"], "validation": validation[best].fitness_mean}
     return {**training, **{name: asdict(each) for name, each in zip(names, tested, strict=True)}}
 
 
 def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
-    acting = baseline(settings.task, settings.algorithm)
+    assert settings.algorithm.rule is not None
+    acting = acting_by_rule(settings.algorithm.rule, settings.task)
     episodes = unseen_episodes(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_all(runner.run(acting, episodes))
+        (tested,) = score_all(runner.run([acting] if isinstance(acting, Brain) else acting, episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
-        trace = runner.trace(acting if isinstance(acting, RandomActions) else acting[0], episodes[0])
+        trace = runner.trace(acting, episodes[0])
     _write_trace(settings, directory, trace)
     merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
     return {"champion": asdict(tested), "standing_still": asdict(standing)}
@@ -229,7 +221,7 @@ def _compile(settings: RunSettings, team: Team) -> Brain:
 
 
 def _standing_still(settings: RunSettings) -> Brain:
-    return motionless(settings.task.observation_size, settings.task.resting_action)
+    return motionless(settings.task.sensed_size, settings.task.resting_action)
 
 
 def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
