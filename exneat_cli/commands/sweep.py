@@ -19,7 +19,7 @@ from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import heeding, scratch_directory
 from exneat_cli.records import DONE
-from exneat_cli.runs import Silence, progress_for_terminal, run_robustness, train
+from exneat_cli.runs import Progress, progress_for_terminal, run_robustness, train
 
 _BASIC_LAUNCHER = "hydra._internal.core_plugins.basic_launcher.BasicLauncher"
 
@@ -123,7 +123,7 @@ class Launch:
 
     def _do(self, job: Job, *, show_bar: bool) -> str:
         settings, asked = job.settings, job.sweeps
-        progress = progress_for_terminal() if show_bar else Silence()
+        progress = progress_for_terminal() if show_bar else Progress()
         finished = train(settings, progress=progress, command=self.command, go_on=True)
         directory = finished.directory
         run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)

@@ -21,7 +21,7 @@ from exneat_cli.records import (
     read_yaml,
 )
 from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
-from exneat_cli.runs.progress import Progress, Silence
+from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import Score, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 
@@ -124,7 +124,7 @@ def run_robustness(
             levels = missing_levels(directory, sweep, episodes)
             if not levels:
                 continue
-            (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
+            (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             todo = Sweep(sweep.name, sweep.parameter, levels)
             seeds = unseen_episodes(settings, episodes)
             tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)

@@ -16,7 +16,7 @@ import yaml
 from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import HistoryRow, RunDirectory, read_champion
+from exneat_cli.records import RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs import training as training_module
@@ -205,23 +205,15 @@ def exploding(brains: Brains, every: int = 1) -> Brains:
 
 def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o), every=2))
-    seen: list[HistoryRow] = []
     settings = tiny(tmp_path, population=10, generations=4)
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        trained = training_module.evolve(settings, runner, lambda rows: seen.append(rows[-1]))
-    assert [row.failed_episodes for row in seen] == [5, 5, 5, 5]
-    assert all(row.best_fitness > -100.0 for row in seen)
-    assert all(np.isfinite(row).all() for row in seen)
-    assert all(entry.fitness > -100.0 for entry in trained.hall_of_fame)
-
-
-def test_failed_teams_rank_behind_sound_ones_that_are_below_the_floor() -> None:
-    told = training_module._failed_last([-150.0, -100.0, -120.0, -100.0], sound=[0, 2])
-    assert told[0] == -150.0
-    assert told[2] == -120.0
-    assert max(told[1], told[3]) < -150.0
-    assert training_module._failed_last([-100.0, 5.0], sound=[1]) == [-100.0, 5.0]
-    assert training_module._failed_last([-100.0, -100.0], sound=[]) == [-100.0, -100.0]
+        training = training_module.Training.start(settings)
+        while not training.is_over:
+            training.advance(runner)
+    assert [row["failed_episodes"] for row in training.history] == [5, 5, 5, 5]
+    assert all(row["best_fitness"] > -100.0 for row in training.history)
+    assert all(np.isfinite(list(row.values())).all() for row in training.history)
+    assert all(entry.fitness > -100.0 for entry in training.search.candidates())
 
 
 def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) -> None:
