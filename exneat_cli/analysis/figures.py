@@ -8,13 +8,15 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.records import make_directory, write_whole
 
+GREY = "#444444"
+"""Of what belongs to no variant or module."""
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "exneat",
     "axes.spines.top": False,
@@ -27,15 +29,14 @@ _STYLE: dict[Any, Any] = {
 _METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
 
 
-def new_figure(width: float = 7.0, height: float = 4.2) -> Figure:
-    """An empty figure of the given size in inches, in the style of all figures."""
-    with style():
-        return Figure(figsize=(width, height), layout="constrained")
-
-
 def style() -> AbstractContextManager[None]:
-    """Context in which axes are made and figures saved."""
-    return matplotlib.rc_context(_STYLE)
+    """Context in which figures are made and saved; a matplotlibrc of the user's own does not count there."""
+    return matplotlib.style.context(_STYLE, after_reset=True)
+
+
+def new_figure(width: float = 7.0, height: float = 4.2) -> Figure:
+    """An empty figure of the given size in inches; to be called in `style`."""
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def tick_levels(axes: Axes, levels: Iterable[float]) -> None:

@@ -11,8 +11,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.analysis.figures import new_figure, save_figure, style, tick_levels
+from exneat_cli.analysis.study import read_csv
 from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory
 
 MOST_PREY = 50
