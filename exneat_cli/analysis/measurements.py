@@ -9,10 +9,8 @@ import pandas as pd
 
 from exneat_cli.analysis.catalogue import Column
 from exneat_cli.analysis.statistics import compare, efficiency, mean
-from exneat_cli.analysis.study import Study
+from exneat_cli.analysis.study import BEST, Study
 
-BEST = 5
-"""How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
 STATISTICS = ["mean", "low", "high", "iqm", "best_5"]
 """Columns of a summary that are in the unit of their quantity."""
 SUMMARY = ["experiment", "condition", "variant", "quantity", "runs", *STATISTICS, "p_holm", "a12", "efficiency"]

@@ -1,12 +1,9 @@
 """Axes of a report: how runs learned, and how champions hold up at the levels of a sweep.
 
-Every function draws on empty axes and returns how many runs of each variant it shows. It takes them as one table per
-variant: a row per place on the horizontal axis, a column per seed.
+Runs come as one table per variant: a row per place on the horizontal axis, a column per seed.
 """
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -15,12 +12,11 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from exneat_cli.analysis.catalogue import Panel
-from exneat_cli.analysis.figures import GREY, tick_levels
-from exneat_cli.analysis.measurements import BEST
 from exneat_cli.analysis.statistics import bootstrap_interval
-from exneat_cli.analysis.study import Study
-from exneat_cli.analysis.variant_styles import Look, variant_styles
+from exneat_cli.analysis.study import BEST, Study
+from exneat_cli.analysis.styles import GREY, Look, tick_levels, variant_styles
 
+Tables = dict[str, pd.DataFrame]
 AXIS_LABELS = {
     "generation": "generation",
     "episodes": "training episodes",
@@ -30,71 +26,42 @@ AXIS_LABELS = {
 MOST_POINTS = 100
 """Points of a curve beyond these could not be told apart, but each would cost a bootstrap."""
 MARKERS_PER_CURVE = 8
-_ROUNDING = 1e-9
+_DASHED = {"linestyle": "--", "linewidth": 1.2}
 
 
-def draw_means(axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
-    """Draw each variant's mean over runs with its 95% band, over one of `AXIS_LABELS`.
+def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
+    """Draw one panel of a figure; baselines are grey lines.
 
-    Raises:
-        MissingRunsError: a variant has no finished run.
-    """
-    return _draw_training(axes, panel, study, axis, each_run=False)
+    Args:
+        kind: ``training`` (means of runs with 95% bands), ``training_runs`` (each run thin, means thick), ``area`` (one
+            point per run, its mean over generations), ``robustness`` (means of runs with 95% bands; where a variant has
+            more than `BEST` runs, dashed the mean of those best on validation) or ``cluster`` (one point per run at
+            each level).
+        axes: empty.
+        panel: what it shows.
+        study: that of the panel's experiment.
+        axis: horizontal axis of training curves, one of `AXIS_LABELS`.
 
-
-def draw_each_run(axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
-    """Draw each run as a thin line and each variant's mean as a thick one, over one of `AXIS_LABELS`.
-
-    Raises:
-        MissingRunsError: a variant has no finished run.
-    """
-    return _draw_training(axes, panel, study, axis, each_run=True)
-
-
-def _draw_training(axes: Axes, panel: Panel, study: Study, axis: str, *, each_run: bool) -> dict[str, int]:
-    counts = {}
-    styles = variant_styles(study.variants)
-    for variant, history in _histories(panel, study).items():
-        look, curves = styles[variant], common_curves(history, axis)
-        if each_run:
-            for _, run in history.groupby("seed"):
-                axes.plot(run[axis], run["best_so_far"], color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
-        else:
-            _draw_band(axes, curves, look)
-        every = max(1, len(curves) // MARKERS_PER_CURVE)
-        width, label = (2.6 if each_run else 1.8), study.variants[variant]
-        axes.plot(curves.index, curves.mean(axis=1), linewidth=width, markevery=every, label=label, **look)
-        counts[variant] = curves.shape[1]
-    axes.set(xlabel=AXIS_LABELS[axis], ylabel=f"best {study.fitness_name} so far")
-    if axis == "generation":
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    else:
-        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
-    return counts
-
-
-def draw_areas(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
-    """Draw one point per run, the mean over generations of its best so far.
+    Returns:
+        The number of runs of each variant that it shows.
 
     Raises:
-        MissingRunsError: a variant has no finished run.
+        MissingRunsError: a variant has no finished run, or none has a finished sweep.
     """
-    counts = {}
-    styles = variant_styles(study.variants)
-    for place, (variant, history) in enumerate(_histories(panel, study).items()):
-        areas = history.groupby("seed")["best_so_far"].mean().to_frame().T
-        _draw_points(axes, np.array([place]), areas, styles[variant], study.variants[variant], room=0.7, size=40)
-        counts[variant] = areas.shape[1]
-    _explain_bars(axes)
-    axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
-    axes.margins(x=0.08)
-    return counts
-
-
-def _histories(panel: Panel, study: Study) -> dict[str, pd.DataFrame]:
+    if kind in ("robustness", "cluster"):
+        tables = _swept(panel, study)
+        (_draw_levels if kind == "robustness" else _draw_clusters)(axes, panel, study, tables)
+        score = "full reward" if panel.value == "full_reward" else study.fitness_name
+        axes.set(xlabel=study.sweeps[str(panel.sweep)], ylabel=score)
+        return {variant: table.shape[1] for variant, table in tables.items()}
     study.require(panel.condition, study.trained_variants)
     history = study.history(panel.condition)
-    return {variant: history[history["variant"] == variant] for variant in study.trained_variants}
+    histories = {variant: history[history["variant"] == variant] for variant in study.trained_variants}
+    if kind == "area":
+        _draw_areas(axes, study, histories)
+    else:
+        _draw_curves(axes, study, histories, axis, each_run=kind == "training_runs")
+    return {variant: own["seed"].nunique() for variant, own in histories.items()}
 
 
 def common_curves(history: pd.DataFrame, axis: str) -> pd.DataFrame:
@@ -116,18 +83,51 @@ def common_curves(history: pd.DataFrame, axis: str) -> pd.DataFrame:
     return reached.iloc[np.unique(np.linspace(0, len(reached) - 1, MOST_POINTS).round().astype(int))]
 
 
-def draw_levels(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
-    """Draw each variant's mean over runs at each level, with its 95% band; baselines are grey lines.
+def _draw_curves(axes: Axes, study: Study, histories: Tables, axis: str, *, each_run: bool) -> None:
+    for variant, look in variant_styles(study.trained_variants).items():
+        curves = common_curves(histories[variant], axis)
+        if each_run:
+            for _, run in histories[variant].groupby("seed"):
+                axes.plot(run[axis], run["best_so_far"], color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
+        else:
+            _draw_band(axes, curves, look)
+        marks = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
+        axes.plot(curves.index, curves.mean(axis=1), label=study.variants[variant], **look, **marks)
+    axes.set(xlabel=AXIS_LABELS[axis], ylabel=f"best {study.fitness_name} so far")
+    if axis == "generation":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    else:
+        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
 
-    The dashed line of a variant is the mean over its `BEST` runs best on validation. It is left out
-    where there are no more runs than that.
 
-    Raises:
-        MissingRunsError: no trained variant has a finished sweep.
-    """
-    tables = _swept(panel, study)
+def _draw_areas(axes: Axes, study: Study, histories: Tables) -> None:
+    for place, (variant, look) in enumerate(variant_styles(study.trained_variants).items()):
+        areas = histories[variant].groupby("seed")["best_so_far"].mean().to_frame().T
+        _draw_points(axes, np.array([place]), areas, look, study.variants[variant], room=0.7, size=40)
+    _explain_bars(axes)
+    axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
+    axes.margins(x=0.08)
+
+
+def _swept(panel: Panel, study: Study) -> Tables:
+    """What the runs of each variant reached at each level; variants that were not swept are left out."""
+    rows = study.robustness(panel.condition)
+    rows = rows[rows["parameter"] == panel.sweep]
+    if panel.highest is not None:
+        rows = rows[rows["level"] <= panel.highest + 1e-9]
+    score = f"{panel.value}_mean"
+    tables = {
+        variant: rows[rows["variant"] == variant].pivot_table(index="level", columns="seed", values=score)
+        for variant in study.variants
+        if (rows["variant"] == variant).any()
+    }
+    if not set(tables) & set(study.trained_variants):
+        raise study.lacking(panel.condition, f"no finished sweep of {panel.sweep}")
+    return tables
+
+
+def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
     styles = variant_styles(study.variants, study.baselines)
-    dashes = {"linestyle": "--", "linewidth": 1.2}
     some_are_chosen = False
     for variant, table in tables.items():
         axes.plot(table.index, table.mean(axis=1), label=study.variants[variant], **styles[variant])
@@ -136,22 +136,15 @@ def draw_levels(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
         _draw_band(axes, table, styles[variant])
         if table.shape[1] > BEST:
             best = [run.seed for run in study.best_first(panel.condition, variant) if run.seed in table][:BEST]
-            axes.plot(table.index, table[best].mean(axis=1), color=styles[variant]["color"], zorder=2, **dashes)
+            axes.plot(table.index, table[best].mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
             some_are_chosen = True
     if some_are_chosen:
-        axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **dashes)
+        axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
-    _label_sweep(axes, panel, study)
-    return _counts(tables)
 
 
-def draw_clusters(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
-    """Draw one point per run at each level, variants side by side.
-
-    Raises:
-        MissingRunsError: no trained variant has a finished sweep.
-    """
-    tables = _swept(panel, study)
+def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
+    """Variants stand side by side at each level."""
     levels = sorted({level for table in tables.values() for level in table.index})
     trained = [variant for variant in tables if variant not in study.baselines]
     styles = variant_styles(study.variants, study.baselines)
@@ -167,29 +160,9 @@ def draw_clusters(axes: Axes, panel: Panel, study: Study) -> dict[str, int]:
             aside = (trained.index(variant) - (len(trained) - 1) / 2) * room
             _draw_points(axes, places + aside, table, look, label, room, size=12)
     _explain_bars(axes)
-    _label_sweep(axes, panel, study)
     axes.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
     axes.set_xlim(-0.6, len(levels) - 0.4)
     axes.grid(visible=False, axis="x")
-    return _counts(tables)
-
-
-def _swept(panel: Panel, study: Study) -> dict[str, pd.DataFrame]:
-    """What the runs of each variant reached at each level; variants that were not swept are left out."""
-    rows = study.robustness(panel.condition)
-    rows = rows[rows["parameter"] == panel.sweep]
-    if panel.highest is not None:
-        rows = rows[rows["level"] <= panel.highest + _ROUNDING]
-    tables = {
-        variant: rows[rows["variant"] == variant].pivot_table(
-            index="level", columns="seed", values=f"{panel.value}_mean"
-        )
-        for variant in study.variants
-        if (rows["variant"] == variant).any()
-    }
-    if not set(tables) & set(study.trained_variants):
-        raise study.lacking(panel.condition, f"no finished sweep of {panel.sweep}")
-    return tables
 
 
 def _draw_band(axes: Axes, table: pd.DataFrame, look: Look) -> None:
@@ -204,20 +177,10 @@ def _draw_points(
     """Draw a point per run within `room` of each place, from left to right by seed, and a bar for their mean."""
     count = table.shape[1]
     aside = np.linspace(-0.3, 0.3, count) * room if count > 1 else np.zeros(1)
-    x = (places[:, None] + aside).ravel()
     dots = {"color": look["color"], "marker": look["marker"], "label": label}
-    axes.scatter(x, table.to_numpy().ravel(), s=size, alpha=0.7, linewidths=0.0, **dots)
+    axes.scatter((places[:, None] + aside).ravel(), table.to_numpy().ravel(), s=size, alpha=0.7, linewidths=0.0, **dots)
     axes.hlines(table.mean(axis=1), places - 0.42 * room, places + 0.42 * room, color=look["color"], linewidth=2.0)
 
 
 def _explain_bars(axes: Axes) -> None:
     axes.plot([], [], color=GREY, linewidth=2.4, label="bar: mean over runs")
-
-
-def _label_sweep(axes: Axes, panel: Panel, study: Study) -> None:
-    score = "full reward" if panel.value == "full_reward" else study.fitness_name
-    axes.set(xlabel=study.sweeps[str(panel.sweep)], ylabel=score)
-
-
-def _counts(tables: Mapping[str, pd.DataFrame]) -> dict[str, int]:
-    return {variant: table.shape[1] for variant, table in tables.items()}

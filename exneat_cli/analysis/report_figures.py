@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exneat_cli.analysis import panels
 from exneat_cli.analysis.captions import budget_sentence, few_runs_sentence, spent_in
 from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
-from exneat_cli.analysis.figures import new_figure, save_figure, style
-from exneat_cli.analysis.measurements import BEST
 from exneat_cli.analysis.network_data import read_champion_graph
 from exneat_cli.analysis.network_graph import champions_figure
-from exneat_cli.analysis.study import MissingRunsError, Study
+from exneat_cli.analysis.panels import AXIS_LABELS, draw_panel
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study
+from exneat_cli.analysis.styles import new_figure, save_figure, style
 from exneat_cli.errors import ExneatError, check_choice
 
-AXES = tuple(panels.AXIS_LABELS)
+AXES = tuple(AXIS_LABELS)
 """What the horizontal axis of a training curve can be."""
-_OVER_AN_AXIS: dict[str, Callable[[Axes, Panel, Study, str], dict[str, int]]] = {
-    "training": panels.draw_means,
-    "training_runs": panels.draw_each_run,
-}
-_OTHERS: dict[str, Callable[[Axes, Panel, Study], dict[str, int]]] = {
-    "area": panels.draw_areas,
-    "robustness": panels.draw_levels,
-    "cluster": panels.draw_clusters,
-}
 _WHAT_IS_SHOWN = {
     "training": "Lines: best fitness so far, mean over runs; bands: 95% bootstrap interval over runs.",
     "training_runs": "Thin lines: best fitness so far of each run; thick lines: mean over runs.",
@@ -37,11 +26,6 @@ _WHAT_IS_SHOWN = {
     "robustness": "Lines with markers: mean over all runs; bands: 95% bootstrap interval over runs.",
     "cluster": "One point per run: the mean over its test episodes at that level; bars: mean over runs.",
 }
-_WITH_INTERVALS = ("training", "robustness")
-_SIZES = {1: (7.0, 4.8), 2: (10.4, 4.8)}
-_CLUSTER_SIZES = {1: (10.4, 5.2), 2: (16.0, 5.2)}
-"""Inches, by number of panels; clusters need room for every variant at every level."""
-_MORE_PANELS = 4.8
 _KEY_WIDTH, _LETTER_WIDTH = 0.6, 0.075
 """Inches that an entry of the legend takes, at least roughly."""
 
@@ -85,7 +69,7 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
 
 
 def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Figure, list[str]]:
-    """Side by side, of each panel's variant the champion of the run that was best on validation."""
+    """Of each panel's variant the champion of the run that was best on validation, side by side."""
     graphs, titles, sentences = [], [], []
     for panel in plan.panels:
         study, variant = studies[panel.experiment], str(panel.variant)
@@ -100,25 +84,23 @@ def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Fig
 
 
 def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> tuple[Figure, list[str]]:
-    sizes = _CLUSTER_SIZES if plan.kind == "cluster" else _SIZES
-    width, height = sizes.get(len(plan.panels), (_MORE_PANELS * len(plan.panels), _MORE_PANELS))
+    # Clusters need room for every variant at every level.
+    sizes = {1: (10.4, 5.2), 2: (16.0, 5.2)} if plan.kind == "cluster" else {1: (7.0, 4.8), 2: (10.4, 4.8)}
+    width, height = sizes.get(len(plan.panels), (4.8 * len(plan.panels), 4.8))
     counts = []
     with style():
         figure = new_figure(width, height)
         for axes, panel in zip(figure.subplots(1, len(plan.panels), squeeze=False)[0], plan.panels, strict=True):
             study = studies[panel.experiment]
-            if plan.kind in _OVER_AN_AXIS:
-                counts.append(_OVER_AN_AXIS[plan.kind](axes, panel, study, axis))
-            else:
-                counts.append(_OTHERS[plan.kind](axes, panel, study))
+            counts.append(draw_panel(plan.kind, axes, panel, study, axis))
             axes.set_title(study.conditions[panel.condition], fontsize=10)
         figure.suptitle(plan.title, fontsize=12)
         _add_legend(figure, width)
-    return figure, _sentences(plan, studies, counts, axis)
+    return figure, list(_sentences(plan, studies, counts, axis))
 
 
 def _add_legend(figure: Figure, width: float) -> None:
-    """One legend for all panels, below them, so that it covers no data."""
+    """Add one legend for all panels, below them, so that it covers no data."""
     entries: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -130,31 +112,23 @@ def _add_legend(figure: Figure, width: float) -> None:
 
 def _sentences(
     plan: FigurePlan, studies: Mapping[str, Study], counts: Sequence[Mapping[str, int]], axis: str
-) -> list[str]:
-    sentences, trained, spent = [], [], []
+) -> Iterator[str]:
+    trained, spent = [], []
     for number, (panel, runs) in enumerate(zip(plan.panels, counts, strict=True), start=1):
         study = studies[panel.experiment]
-        place = f"Panel {number}, " if len(plan.panels) > 1 else ""
+        label = study.conditions[panel.condition]
+        place = f"Panel {number}, {label}" if len(plan.panels) > 1 else label[:1].upper() + label[1:]
         listed = "; ".join(f"{study.variants[variant]} {count}" for variant, count in runs.items())
-        sentences.append(f"{place}{study.conditions[panel.condition]}, number of runs: {listed}.")
+        yield f"{place}, number of runs: {listed}."
         learning = [variant for variant in runs if variant in study.trained_variants]
         trained += [runs[variant] for variant in learning]
         spent.append(spent_in(study, panel.condition, learning))
-    sentences[0] = sentences[0][0].upper() + sentences[0][1:]
-    budgets = dict.fromkeys(studies[panel.experiment].budget for panel in plan.panels)
-    return [
-        *sentences,
-        _WHAT_IS_SHOWN[plan.kind],
-        *_particulars(plan.kind, axis, trained),
-        f"Budget: {', '.join(budgets)}.",
-        budget_sentence(spent),
-    ]
-
-
-def _particulars(kind: str, axis: str, trained: Sequence[int]) -> Iterable[str]:
-    if kind in _OVER_AN_AXIS and axis != "generation":
+    yield _WHAT_IS_SHOWN[plan.kind]
+    if plan.kind in ("training", "training_runs") and axis != "generation":
         yield "Between generations a run counts with its latest value, and a mean ends where the first of its runs does."
-    if kind == "robustness" and max(trained) > BEST:
+    if plan.kind == "robustness" and max(trained) > BEST:
         yield f"Dashed lines: mean of the {BEST} runs of a variant that were best on validation."
-    if kind in _WITH_INTERVALS:
+    if plan.kind in ("training", "robustness"):
         yield few_runs_sentence(trained)
+    yield f"Budget: {', '.join(dict.fromkeys(studies[panel.experiment].budget for panel in plan.panels))}."
+    yield budget_sentence(spent)

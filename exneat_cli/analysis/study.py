@@ -18,6 +18,8 @@ import pandas as pd
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory
 
+BEST = 5
+"""How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
 SPENT = ("episodes", "env_steps", "wall_seconds")
 """What training spends: episodes, control steps, seconds."""
 _RESULTS = ("training", "validation", "test", "full_reward", *SPENT)
