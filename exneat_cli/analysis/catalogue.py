@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -14,7 +13,7 @@ from exneat_cli.errors import ExneatError, check_choice
 from exneat_cli.records import read_yaml
 
 FIGURE_KINDS = ("training", "training_runs", "robustness", "cluster", "area", "network")
-QUANTITIES = ("training", "test", "efficiency", "robustness")
+QUANTITIES = ("training", "test", "full_reward", "efficiency", "robustness")
 VALUES = ("fitness", "full_reward")
 
 
@@ -41,14 +40,9 @@ class Panel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FigurePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One figure.
+    """One figure: name (its files are called so), kind (of `FIGURE_KINDS`), title, and panels from left to right.
 
-    Attributes:
-        name: e.g. ``figure-4.3``; its files are called so.
-        kind: one of `FIGURE_KINDS`.
-        title: above the picture, and first in its caption.
-        panels: from left to right.
-        variants: the trained variants that it shows; empty for all.
+    Of the trained variants it shows those in `variants`; without any, all.
     """
 
     name: str
@@ -67,11 +61,10 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What one column of a table shows.
 
     Attributes:
-        of: ``training`` (final best so far), ``test`` (the champion on the test episodes), ``efficiency``
-            (first generation, from 1, at which the mean best so far reaches the final mean of the first
+        of: ``training`` (final best so far), ``test`` and ``full_reward`` (of the champion on the test episodes),
+            ``efficiency`` (first generation, from 1, at which the mean best so far reaches the final mean of the first
             variant), or ``robustness``.
-        sweep, level: of a robustness sweep; needed there.
-        value: one of `VALUES`, of the test episodes or the sweep.
+        sweep, level, value: of a robustness sweep, with one of `VALUES`; needed there alone.
     """
 
     of: str
@@ -96,15 +89,7 @@ class TableRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TablePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="table"):
-    """One table.
-
-    Attributes:
-        name: e.g. ``table-5.1``.
-        title: above it.
-        columns: name -> what it shows.
-        rows: from top to bottom.
-        note: a sentence below it, or nothing.
-    """
+    """One table: name (its files are called so), title, columns by name, rows from top to bottom, and a note below."""
 
     name: str
     title: str
@@ -118,14 +103,11 @@ class TablePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
                 check_choice("published", column, tuple(self.columns))
 
 
-@dataclass(frozen=True)
-class Built:
+class Built(NamedTuple):
     """One figure or table that lies on disk.
 
     Attributes:
-        name: e.g. ``figure-4.3``; its files are called so.
-        title: what it shows, in a few words.
-        caption: the sentences below it.
+        name, title, caption: what it is called, what it shows in a few words, and the sentences below it.
         paths: its files.
         header, rows: the cells of a table, as printed; empty for a figure.
     """

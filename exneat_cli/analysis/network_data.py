@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -89,10 +89,15 @@ def champion_graph(content: dict[str, Any]) -> ChampionGraph:
     )
     links = tuple(
         Link(source, (m, -1 - k), plan.modules[m].pins[k].delayed)
-        for m, sources in enumerate(inputs)
-        for k, source in enumerate(sources)
+        for m, own in enumerate(inputs)
+        for k, source in enumerate(own)
         if source[0] != SENSORS and source[1] in nodes[source[0]]
     )
+    sensing = {(m, -1 - k) for m, own in enumerate(inputs) for k, source in enumerate(own) if source[0] == SENSORS}
+    driving = {(m, output) for m, module in enumerate(plan.modules) for output in range(len(module.drives))}
+    steps = [((m, edge.source), (m, edge.target)) for m, own in enumerate(edges) for edge in own]
+    steps += [(link.source, link.target) for link in links]
+    back = [(target, source) for source, target in steps]
     return ChampionGraph(
         plan=plan,
         actuators=tuple(content["actuators"]),
@@ -101,7 +106,7 @@ def champion_graph(content: dict[str, Any]) -> ChampionGraph:
         hidden=tuple(tuple(keys[module.outputs :]) for keys, module in zip(nodes, plan.modules, strict=True)),
         edges=edges,
         links=links,
-        used=_used(plan, inputs, edges, links),
+        used=frozenset(_reachable(sensing, steps) & _reachable(driving, back)),
         test_fitness=content["scores"]["test"]["fitness_mean"],
     )
 
@@ -111,25 +116,8 @@ def _read_by(plan: Plan, pin: Pin) -> Node:
     return pin.module, first + pin.index
 
 
-def _used(
-    plan: Plan, inputs: Iterable[Iterable[Node]], edges: Iterable[Iterable[Edge]], links: Iterable[Link]
-) -> frozenset[Node]:
-    steps = [((m, edge.source), (m, edge.target)) for m, own in enumerate(edges) for edge in own]
-    steps += [(link.source, link.target) for link in links]
-    sensing = {(m, -1 - k) for m, own in enumerate(inputs) for k, source in enumerate(own) if source[0] == SENSORS}
-    driving = {(m, output) for m, module in enumerate(plan.modules) for output in range(len(module.drives))}
-    back = [(target, source) for source, target in steps]
-    return frozenset(_reachable(sensing, steps) & _reachable(driving, back))
-
-
-def _reachable(starts: Iterable[Node], steps: Iterable[tuple[Node, Node]]) -> set[Node]:
-    following: dict[Node, list[Node]] = {}
-    for source, target in steps:
-        following.setdefault(source, []).append(target)
-    found = set(starts)
-    queue = list(found)
-    while queue:
-        new = set(following.get(queue.pop(), [])) - found
-        found |= new
-        queue += new
+def _reachable(starts: set[Node], steps: Collection[tuple[Node, Node]]) -> set[Node]:
+    found = starts
+    while new := {target for source, target in steps if source in found} - found:
+        found = found | new
     return found

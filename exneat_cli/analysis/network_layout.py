@@ -13,18 +13,14 @@ from exneat_cli.wiring import Module
 
 Places = dict[int, tuple[float, float]]
 """(x, y) of the inputs and nodes of one module, by key."""
+
+# Inches. Links run in the gap between boxes. What a box keeps free of nodes: at its top, above outputs that drive
+# something, at its bottom, at its sides.
 GAP = 0.3
-"""Between boxes; links run there."""
 TITLE, OUTPUT_NAMES, INPUT_NAMES, SIDE = 0.32, 0.2, 0.6, 0.2
-"""What a box keeps free of nodes: at its top, above outputs that drive something, at its bottom, at its sides."""
-LAYER = 0.55
-"""Least distance of layers."""
-INPUT = 0.09
-"""Least distance of inputs."""
-ACTUATOR = 0.5
-"""Least distance of outputs that carry a name."""
-_CLEAR = 0.08
-"""Least distance of a node from connections that pass it."""
+# Least distances: of layers, of inputs, of outputs that carry a name, of a node from connections that pass it.
+LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
+
 _SHIFTS = (0.0, 0.15, -0.15, 0.3, -0.3)
 """By how much of the distance between its nodes a layer may move aside; the first is best among equals."""
 _SAME_ROW = 0.1
@@ -126,9 +122,8 @@ def _places(graph: ChampionGraph, m: int, box: Bbox) -> Places:
     # An empty slot between groups.
     places = {-1 - k: (slots[k + gap], bottom) for gap, group in enumerate(groups) for k in group}
     depth = depths(graph.hidden[m], edges)
-    layers = [
-        [node for node in graph.hidden[m] if depth[node] == d] for d in range(1, max(depth.values(), default=0) + 1)
-    ]
+    by_depth = sorted(graph.hidden[m], key=depth.__getitem__)
+    layers = [list(layer) for _, layer in groupby(by_depth, key=depth.__getitem__)]
     for d, layer in enumerate(layers, start=1):
         y = bottom + (top - bottom) * d / (len(layers) + 1)
         ordered = sorted(layer, key=lambda node: (_centre(node, edges, places), node))
@@ -147,32 +142,22 @@ def _spread(box: Bbox, count: int) -> list[float]:
 
 def _centre(node: int, edges: Iterable[Edge], places: Places) -> float:
     """The mean place of what a node reads, weighted: nodes in this order have fewer lines cross."""
-    read = [
-        (places[edge.source][0], abs(edge.weight)) for edge in edges if edge.target == node and edge.source in places
-    ]
-    total = sum(weight for _, weight in read)
-    return sum(x * weight for x, weight in read) / total if total > 0 else np.inf
+    read = [edge for edge in edges if edge.target == node and edge.source in places]
+    total = sum(abs(edge.weight) for edge in read)
+    return sum(places[edge.source][0] * abs(edge.weight) for edge in read) / total if total > 0 else np.inf
 
 
 def _sidestepped(layer: Sequence[int], edges: Iterable[Edge], places: Places, step: float) -> Places:
     """The layer, moved aside if connections that skip it would seem to end at its nodes."""
-    passing = [
-        (places[edge.source], places[edge.target])
-        for edge in edges
-        if edge.source not in layer and edge.target not in layer
-    ]
-
-    def shifted(share: float) -> Places:
-        return {node: (places[node][0] + share * step, places[node][1]) for node in layer}
+    y = places[layer[0]][1]
+    crossings = []
+    for edge in edges:
+        (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
+        if min(y0, y1) < y < max(y0, y1):
+            crossings.append(x0 + (y - y0) / (y1 - y0) * (x1 - x0))
 
     def hits(share: float) -> int:
-        return sum(_touches(start, end, at) for at in shifted(share).values() for start, end in passing)
+        return sum(abs(places[node][0] + share * step - x) < CLEAR for node in layer for x in crossings)
 
-    return shifted(min(_SHIFTS, key=hits))
-
-
-def _touches(start: tuple[float, float], end: tuple[float, float], at: tuple[float, float]) -> bool:
-    if not min(start[1], end[1]) < at[1] < max(start[1], end[1]):
-        return False
-    x = start[0] + (at[1] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
-    return abs(x - at[0]) < _CLEAR
+    share = min(_SHIFTS, key=hits)
+    return {node: (places[node][0] + share * step, y) for node in layer}

@@ -125,7 +125,8 @@ def _sentences(
         spent.append(spent_in(study, panel.condition, learning))
     yield _WHAT_IS_SHOWN[plan.kind]
     if plan.kind in ("training", "training_runs") and axis != "generation":
-        yield "Between generations a run counts with its latest value, and a mean ends where the first of its runs does."
+        yield "Between generations a run counts with its latest value."
+        yield "A mean ends where the first of its runs does."
     if plan.kind == "robustness" and max(trained) > BEST:
         yield f"Dashed lines: mean of the {BEST} runs of a variant that were best on validation."
     if plan.kind in ("training", "robustness"):

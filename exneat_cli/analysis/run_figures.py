@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis.study import read_csv
 from exneat_cli.analysis.styles import BLUE, GREEN, GREY, VERMILION, new_figure, save_figure, style, tick_levels
-from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory
+from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory, read_robustness
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
@@ -56,8 +56,9 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
         labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
         fitness_name: label of the vertical axes, e.g. ``forward reward``.
     """
-    rows = read_csv(run.robustness, RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
-    rows = rows[rows["parameter"] != UNPERTURBED].drop_duplicates(["parameter", "level"], keep="last")
+    tested = [row for row in read_robustness(run.robustness) if row.parameter != UNPERTURBED]
+    rows = pd.DataFrame(tested, columns=RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
+    rows = rows.drop_duplicates(["parameter", "level"], keep="last")
     sweeps = list(rows.groupby("parameter"))
     if not sweeps:
         return []

@@ -16,14 +16,11 @@ import numpy as np
 import pandas as pd
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory
+from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory, read_robustness
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
-SPENT = ("episodes", "env_steps", "wall_seconds")
-"""What training spends: episodes, control steps, seconds."""
-_RESULTS = ("training", "validation", "test", "full_reward", *SPENT)
-_WORDS = ("variant", "parameter")
+_RESULTS = ("training", "validation", "test", "full_reward", "episodes", "env_steps", "wall_seconds")
 
 
 class MissingRunsError(ExneatError):
@@ -100,7 +97,11 @@ class Study:
     def manifests(self) -> Mapping[PlannedRun, Mapping[str, Any]]:
         """The finished runs with their manifests."""
         there = {run: run.directory.read_manifest() for run in self.runs if run.directory.is_there()}
-        return {run: manifest for run, manifest in there.items() if _is_finished(run, manifest)}
+        return {
+            run: manifest
+            for run, manifest in there.items()
+            if manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
+        }
 
     @property
     def finished(self) -> tuple[PlannedRun, ...]:
@@ -133,10 +134,12 @@ class Study:
         champion's means over episodes); episodes, env_steps and wall_seconds of training. NaN for what a run lacks:
         baselines have test figures alone.
         """
-        rows = [
-            (run.condition, run.variant, run.seed, *_results(manifest["result"], manifest.get("budget_spent", {})))
-            for run, manifest in self.manifests.items()
-        ]
+        rows = []
+        for run, manifest in self.manifests.items():
+            champion = manifest["result"]["champion"]
+            test = {"test": champion["fitness_mean"], "full_reward": champion["full_reward_mean"]}
+            place = {"condition": run.condition, "variant": run.variant, "seed": run.seed}
+            rows.append({**manifest["result"], **manifest.get("budget_spent", {}), **test, **place})
         table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_RESULTS])
         return table.astype(dict.fromkeys(_RESULTS, float))
 
@@ -150,53 +153,35 @@ class Study:
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
-        runs = [run for run in self.finished if run.condition == condition and run.variant not in self.baselines]
-        return _stacked({run: run.directory.history for run in runs}, HistoryRow._fields)
+        tables = [
+            read_csv(run.directory.history, HistoryRow._fields).assign(variant=run.variant, seed=run.seed)
+            for run in self.finished
+            if run.condition == condition and run.variant not in self.baselines
+        ]
+        nothing = pd.DataFrame(columns=[*HistoryRow._fields, "variant", "seed"], dtype=float)
+        return pd.concat(tables or [nothing], ignore_index=True)
 
     def robustness(self, condition: str) -> pd.DataFrame:
         """The planned rows of robustness.csv of all finished runs, with columns ``variant`` and ``seed``.
 
         Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
         """
-        files = {run: run.directory.robustness for run in self.finished if run.condition == condition}
-        table = _stacked({run: path for run, path in files.items() if path.exists()}, RobustnessRow._fields)
-        planned = pd.Series(True, index=table.index)
-        if self.sweep_episodes is not None:
-            planned &= table["episodes"] == self.sweep_episodes
-        if self.levels is not None:
-            levels = {(sweep, float(level)) for sweep, levels in self.levels.items() for level in levels}
-            places = zip(table["parameter"], table["level"], strict=True)
-            planned &= np.array([place in levels for place in places], dtype=bool)
-        return table[planned].reset_index(drop=True)
+        rows = [
+            (*row._replace(variant=run.variant), run.seed)
+            for run in self.finished
+            if run.condition == condition
+            for row in read_robustness(run.directory.robustness)
+            if self._is_planned(row)
+        ]
+        return pd.DataFrame(rows, columns=[*RobustnessRow._fields, "seed"])
 
-
-def _is_finished(run: PlannedRun, manifest: Mapping[str, Any]) -> bool:
-    return manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
-
-
-def _results(result: Mapping[str, Any], spent: Mapping[str, float]) -> tuple[float, ...]:
-    champion = result["champion"]
-    return (
-        result.get("training", np.nan),
-        result.get("validation", np.nan),
-        champion["fitness_mean"],
-        champion["full_reward_mean"],
-        *(spent.get(name, np.nan) for name in SPENT),
-    )
-
-
-def _stacked(files: Mapping[PlannedRun, Path], columns: Sequence[str]) -> pd.DataFrame:
-    tables = [read_csv(path, columns).assign(variant=run.variant, seed=run.seed) for run, path in files.items()]
-    empty = pd.DataFrame(columns=[*dict.fromkeys([*columns, "variant"]), "seed"], dtype=float)
-    return pd.concat(tables, ignore_index=True) if tables else empty
+    def _is_planned(self, row: RobustnessRow) -> bool:
+        is_level = self.levels is None or row.level in self.levels.get(row.parameter, ())
+        return is_level and self.sweep_episodes in (None, row.episodes)
 
 
 def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
-    """Read a table that somebody may have edited.
-
-    Args:
-        path: of the file.
-        columns: that it must have; all but ``variant`` and ``parameter`` must hold numbers.
+    """Read a table of numbers that somebody may have edited; `columns` are those that it must have.
 
     Raises:
         ExneatError: the file is missing or damaged.
@@ -209,8 +194,6 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
     except ValueError as error:
         raise ExneatError(f"{path}: damaged: {str(error).strip().splitlines()[-1]}") from error
     for column in columns:
-        if column not in table:
-            raise ExneatError(f"{path}: damaged: expected a column {column}, got {', '.join(table.columns[:5])} ...")
-        if column not in _WORDS and not pd.api.types.is_numeric_dtype(table[column]):
-            raise ExneatError(f"{path}: damaged: expected numbers in column {column}")
+        if column not in table or not pd.api.types.is_numeric_dtype(table[column]):
+            raise ExneatError(f"{path}: damaged: expected numbers in a column {column}")
     return table

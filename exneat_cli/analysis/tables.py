@@ -15,19 +15,15 @@ import pandas as pd
 
 from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
-from exneat_cli.analysis.measurements import BEST, STATISTICS, summarise
-from exneat_cli.analysis.study import MissingRunsError, Study
+from exneat_cli.analysis.measurements import STATISTICS, summarise
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study
 from exneat_cli.errors import check_choice
 from exneat_cli.records import make_directory, write_whole
 
 LARGE = 10.0
 """Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
-_COMPARED = {
-    "training": Column(of="training"),
-    "test": Column(of="test"),
-    "full_reward": Column(of="test", value="full_reward"),
-    "efficiency": Column(of="efficiency"),
-}
+_KEY = ["experiment", "condition", "variant", "quantity"]
+_PLACE = ["condition", "variant", "quantity", "published"]
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
@@ -42,7 +38,6 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
         MissingRunsError: a variant of the table, or the one that it is compared with, lacks runs or a level.
         ExneatError: the plan names something unknown, or a file cannot be written.
     """
-    _check_names(plan, studies)
     lines = _planned_lines(plan, studies)
     of = {column.of for column in plan.columns.values()}
     sentences = []
@@ -51,55 +46,44 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     best = {}
     if "robustness" in of:
         best = {"best_5": f"ours, best {BEST}"}
-        sentences.append(
-            f"Best {BEST}: mean over the {BEST} runs that are best on validation, or all if there are fewer."
-        )
-    labelled = _labelled(lines, studies)
-    exact = labelled.assign(mean=labelled["mean"].astype(object).where(lines["efficiency"] == "", lines["efficiency"]))
-    place = ["condition", "variant", "quantity", "published"]
+        mean_of_best = f"mean over the {BEST} runs that are best on validation, or all if there are fewer."
+        sentences.append(f"Best {BEST}: {mean_of_best}")
     ours = {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM", **best}
-    headings = {**dict(zip(place, place, strict=True)), **ours, "runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
-    return _write(
-        directory,
-        Built(plan.name, plan.title, " ".join(filter(None, [*sentences, plan.note])), ()),
-        exact[[*place, *STATISTICS, "runs", "p_holm", "a12"]],
-        _printed(labelled)[list(headings)].set_axis(list(headings.values()), axis=1),
-    )
+    headings = {**dict(zip(_PLACE, _PLACE, strict=True)), **ours, "runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
+    labelled = _labelled(lines, studies)
+    exact = labelled[[*_PLACE, *STATISTICS, "runs", "p_holm", "a12"]]
+    is_number = lines["efficiency"] == ""
+    exact = exact.assign(mean=lines["mean"].astype(object).where(is_number, lines["efficiency"]))
+    cells = _printed(labelled)[list(headings)].set_axis(list(headings.values()), axis=1)
+    caption = " ".join(filter(None, [*sentences, plan.note]))
+    return _write(directory, Built(plan.name, plan.title, caption, ()), exact, cells)
 
 
-def _check_names(plan: TablePlan, studies: Mapping[str, Study]) -> None:
+def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFrame:
+    """The lines of the summary that the plan shows, in its order, with a column ``published``."""
+    rows = []
     for row in plan.rows:
         check_choice(f"{plan.name}: experiment", row.experiment, tuple(studies))
         study = studies[row.experiment]
         check_choice(f"{plan.name}: condition of {row.experiment}", row.condition, tuple(study.conditions))
         check_choice(f"{plan.name}: variant of {row.experiment}", row.variant, tuple(study.variants))
-
-
-def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFrame:
-    """The lines of the summary that the plan shows, in its order, with a column ``published``."""
-    key = ["experiment", "condition", "variant", "quantity"]
-    rows = [
-        (row.experiment, row.condition, row.variant, name, str(row.published.get(name, "")))
-        for row in plan.rows
-        for name in plan.columns
-    ]
-    planned = pd.DataFrame(rows, columns=[*key, "published"])
+        place = (row.experiment, row.condition, row.variant)
+        rows += [(*place, name, str(row.published.get(name, ""))) for name in plan.columns]
+    planned = pd.DataFrame(rows, columns=[*_KEY, "published"])
     for (experiment, condition), own in planned.groupby(["experiment", "condition"], sort=False):
-        study = studies[experiment]
-        study.require(condition, dict.fromkeys([study.first_variant, *own["variant"]]))
+        study = studies[str(experiment)]
+        study.require(str(condition), dict.fromkeys([study.first_variant, *own["variant"]]))
     summaries = [
         summarise(studies[str(experiment)], own["condition"].unique(), plan.columns)
         for experiment, own in planned.groupby("experiment", sort=False)
     ]
-    lines = planned.merge(pd.concat(summaries), on=key, how="left")
-    for name, column in plan.columns.items():
-        unmeasured = lines[(lines["quantity"] == name) & (lines["runs"] == 0)]
-        if column.of == "robustness" and len(unmeasured):
-            place = unmeasured.iloc[0]
-            study = studies[place["experiment"]]
-            missing = unmeasured.loc[unmeasured["condition"] == place["condition"], "variant"].map(study.variants)
-            what = f"sweep {column.sweep}, level {column.level}: not measured for {', '.join(missing.unique())}"
-            raise study.lacking(place["condition"], what)
+    lines = planned.merge(pd.concat(summaries), on=_KEY, how="left")
+    swept = [name for name, column in plan.columns.items() if column.of == "robustness"]
+    unmeasured = lines[lines["quantity"].isin(swept) & (lines["runs"] == 0)]
+    for (experiment, condition, quantity), own in unmeasured.groupby(["experiment", "condition", "quantity"]):
+        study, column = studies[str(experiment)], plan.columns[str(quantity)]
+        labels = ", ".join(own["variant"].map(study.variants))
+        raise study.lacking(condition, f"sweep {column.sweep}, level {column.level}: not measured for {labels}")
     return lines
 
 
@@ -120,48 +104,38 @@ def build_comparison(study: Study, directory: Path) -> Built:
         what = f"{study.experiment}, budget {study.budget}: no finished run to compare"
         raise MissingRunsError(f"{what}\n  {study.command}")
     conditions = [name for name in study.conditions if (study.results["condition"] == name).any()]
-    columns = {name: column for name, column in _COMPARED.items() if name != "full_reward" or study.has_full_reward}
+    measured = ["training", "test", *(["full_reward"] if study.has_full_reward else [])]
+    columns = {name: Column(of=name) for name in (*measured, "efficiency")}
+    exact = [("runs", "efficiency", "runs")]
+    exact += [(f"{name}_{each}", name, each) for name in measured for each in STATISTICS if each != "best_5"]
+    exact += [(f"test_{each}", "test", each) for each in ("p_holm", "a12")]
+    exact += [("efficiency", "efficiency", "efficiency")]
+    shown = [("runs", "efficiency", "runs")]
+    for name in measured:
+        shown += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
+    shown += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
+    shown += [("efficiency", "efficiency", "mean")]
     lines = summarise(study, conditions, columns)
     labelled = _labelled(lines, {study.experiment: study})
-    measured = [name for name in columns if name != "efficiency"]
-    exact = [("runs", "efficiency", "runs")]
-    exact += [(f"{name}_{each}", name, each) for name in measured for each in ("mean", "low", "high", "iqm")]
-    exact += [
-        ("test_p_holm", "test", "p_holm"),
-        ("test_a12", "test", "a12"),
-        ("efficiency", "efficiency", "efficiency"),
-    ]
-    printed = [("runs", "efficiency", "runs")]
-    for name in measured:
-        printed += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
-    printed += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
-    printed += [("efficiency", "efficiency", "mean")]
-    return _write(
-        directory,
-        Built(
-            f"comparison-{study.experiment}",
-            f"All variants of {study.experiment}",
-            " ".join(table_sentences(study, lines, columns)),
-            (),
-        ),
-        _side_by_side(labelled, exact),
-        _side_by_side(_printed(labelled), printed),
-    )
+    name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
+    words = Built(name, title, " ".join(table_sentences(study, lines, columns)), ())
+    return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
 
 
 def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) -> pd.DataFrame:
     """One line per condition and variant; `columns` are headings, each with a quantity and a column of its lines."""
     of = {quantity: rows.reset_index(drop=True) for quantity, rows in lines.groupby("quantity")}
-    places = next(iter(of.values()))[["condition", "variant"]]
+    places = of["efficiency"][["condition", "variant"]]
     wide = pd.concat([places, *(of[quantity][name] for _, quantity, name in columns)], axis=1)
     return wide.set_axis([*places, *(heading for heading, _, _ in columns)], axis=1)
 
 
 def _labelled(lines: pd.DataFrame, studies: Mapping[str, Study]) -> pd.DataFrame:
     """Lines with the labels of conditions and variants in place of their names."""
-    places = lines[["experiment", "condition", "variant"]].itertuples(index=False, name=None)
-    labels = [(studies[e].conditions[condition], studies[e].variants[variant]) for e, condition, variant in places]
-    return lines.assign(condition=[label for label, _ in labels], variant=[label for _, label in labels])
+    of = [studies[experiment] for experiment in lines["experiment"]]
+    conditions = [study.conditions[name] for study, name in zip(of, lines["condition"], strict=True)]
+    variants = [study.variants[name] for study, name in zip(of, lines["variant"], strict=True)]
+    return lines.assign(condition=conditions, variant=variants)
 
 
 def _printed(lines: pd.DataFrame) -> pd.DataFrame:
@@ -189,15 +163,15 @@ def rounded(value: float, decimals: int) -> str:
     return "" if math.isnan(value) else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
-def _write(directory: Path, table: Built, exact: pd.DataFrame, cells: pd.DataFrame) -> Built:
-    """Write ``<name>.csv`` from `exact`, with every digit, and ``<name>.md`` from `cells`; `table` has the words."""
+def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFrame) -> Built:
+    """Write ``<name>.csv`` from `exact`, with every digit, and ``<name>.md`` from `cells`."""
     header, rows = tuple(cells.columns), tuple(cells.itertuples(index=False, name=None))
     make_directory(directory)
-    paths = directory / f"{table.name}.csv", directory / f"{table.name}.md"
+    paths = directory / f"{words.name}.csv", directory / f"{words.name}.md"
     write_whole(paths[0], exact.to_csv(index=False, lineterminator="\n"))
-    lines = [f"# {table.name}: {table.title}", "", *map(_line, (header, ["---"] * len(header), *rows))]
-    write_whole(paths[1], "\n".join([*lines, "", table.caption, ""]))
-    return Built(table.name, table.title, table.caption, paths, header, rows)
+    lines = [f"# {words.name}: {words.title}", "", *map(_line, (header, ["---"] * len(header), *rows))]
+    write_whole(paths[1], "\n".join([*lines, "", words.caption, ""]))
+    return words._replace(paths=paths, header=header, rows=rows)
 
 
 def _line(cells: Iterable[str]) -> str:
