@@ -17,32 +17,34 @@ _MEANINGS = {
 }
 
 
-def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> list[str]:
+def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
     """Say what a table rests on and what its columns mean.
 
-    Args:
-        study: what was run.
-        lines: those of `summarise` that the table shows of the study, maybe with a column ``published``.
-        quantities: of `QUANTITIES`, or ``full_reward``.
+    `lines` are those of the study's summary that it shows, maybe with a column ``published``; `quantities` are some of
+    `QUANTITIES`.
     """
     conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
     is_published = "published" in lines and bool((lines["published"] != "").any())
     first = study.variants[study.first_variant]
-    sentences = [
-        _runs_sentence(study, conditions, variants),
-        "The published figures rest on a larger budget." if is_published and study.budget != "paper" else "",
-        _quantity_sentence(study, quantities),
-        "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean.",
-        few_runs_sentence(lines.loc[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0), "runs"]),
-        f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition.",
-        f"A12: chance that a run of the variant beats a run of {first}, a tie counting half.",
-    ]
+    counts = {variant: [len(study.of(condition, variant)) for condition in conditions] for variant in variants}
+    # Labels of variants may hold commas.
+    listed = "; ".join(f"{study.variants[variant]} {_range(runs)}" for variant, runs in counts.items())
+    yield f"Budget {study.budget}; finished runs per condition: {listed}."
+    if is_published and study.budget != "paper":
+        yield "The published figures rest on a larger budget."
+    if meanings := [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]:
+        yield f"{'; '.join(meanings).capitalize()}."
+    if study.fitness_name != "fitness":
+        yield f"Fitness is {study.fitness_name}."
+    yield "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean."
+    yield few_runs_sentence(lines.loc[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0), "runs"])
+    yield f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition."
+    yield f"A12: chance that a run of the variant beats a run of {first}, a tie counting half."
     if "efficiency" in quantities:
         reached = "first generation, counted from 1, at which the mean best so far reaches the final mean of"
-        sentences.append(f"Efficiency: {reached} {first}.")
-        sentences.append("Published efficiencies are not exactly comparable." if is_published else "")
-    sentences.append(budget_sentence([spent_in(study, condition, variants) for condition in conditions]))
-    return [sentence for sentence in sentences if sentence]
+        yield f"Efficiency: {reached} {first}."
+        yield "Published efficiencies are not exactly comparable." if is_published else ""
+    yield budget_sentence([spent_in(study, condition, variants) for condition in conditions])
 
 
 def few_runs_sentence(groups: Iterable[int]) -> str:
@@ -52,27 +54,12 @@ def few_runs_sentence(groups: Iterable[int]) -> str:
     return f"Intervals are too narrow below {ENOUGH_RUNS} runs, and a single run has none."
 
 
-def _runs_sentence(study: Study, conditions: Sequence[str], variants: Iterable[str]) -> str:
-    parts = []
-    for variant in variants:
-        counts = [len(study.of(condition, variant)) for condition in conditions]
-        parts.append(f"{study.variants[variant]} {_range(counts)}")
-    # Labels of variants may hold commas.
-    return f"Budget {study.budget}; finished runs per condition: {'; '.join(parts)}."
-
-
-def _quantity_sentence(study: Study, quantities: Collection[str]) -> str:
-    found = [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]
-    fitness = "" if study.fitness_name == "fitness" else f" Fitness is {study.fitness_name}."
-    return f"{'; '.join(found).capitalize()}.{fitness}" if found else fitness.strip()
-
-
 def spent_in(study: Study, condition: str, variants: Collection[str]) -> pd.DataFrame:
     """What training took in one condition: a row per run with the variant's label, episodes and env_steps."""
     results = study.results
     here = results[(results["condition"] == condition) & results["variant"].isin(list(variants))]
-    spent = here.dropna(subset="episodes")
-    return spent.assign(variant=spent["variant"].map(study.variants))[["variant", "episodes", "env_steps"]]
+    labelled = here.assign(variant=here["variant"].map(study.variants))
+    return labelled[["variant", "episodes", "env_steps"]].dropna()
 
 
 def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
@@ -84,7 +71,7 @@ def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
     Args:
         places: one table of `spent_in` for each condition or panel; variants are compared within each.
     """
-    spent = pd.concat([*places, pd.DataFrame(columns=["variant", "episodes", "env_steps"])])
+    spent = pd.concat(places) if places else pd.DataFrame()
     if spent.empty:
         return "No run has spent anything on training."
     by_variant = spent.groupby("variant", sort=False)

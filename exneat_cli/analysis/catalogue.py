@@ -140,8 +140,8 @@ def _plan(name: str, entry: Any) -> FigurePlan | TablePlan:
         raise ExneatError(f"expected keys with values, got {entry!r}")
     kind = entry.get("kind")
     check_choice("kind", kind, (*FIGURE_KINDS, "table"))
-    schema = TablePlan if kind == "table" else FigurePlan
-    return msgspec.convert({**entry, "name": name}, type=schema)
+    named = {**entry, "name": name}
+    return msgspec.convert(named, TablePlan) if kind == "table" else msgspec.convert(named, FigurePlan)
 
 
 def _reason(message: str) -> str:

@@ -21,13 +21,14 @@ from exneat_cli.analysis.study import Study
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import make_directory, write_whole
 
-_SECTIONS = (
-    ("chapter-4", "Chapter 4: figures", ("figure-4.",)),
-    ("chapter-5", "Chapter 5: tables and figures", ("table-5.", "figure-5.")),
-    ("chapter-7", "Chapter 7: figures", ("figure-7.",)),
-    ("comparisons", "Comparisons", ("comparison-",)),
-    ("others", "Others", ("",)),
-)
+_SECTIONS = {
+    "Chapter 4: figures": ("figure-4.",),
+    "Chapter 5: tables and figures": ("table-5.", "figure-5."),
+    "Chapter 7: figures": ("figure-7.",),
+    "Comparisons": ("comparison-",),
+    "Others": ("",),
+}
+"""Title -> beginnings of the names of what stands there, in this order."""
 _PICTURES = {".png": "image/png", ".svg": "image/svg+xml"}
 _NUMBER = re.compile(r"[\[<>]?-?\d[^A-Za-z]*")
 
@@ -43,57 +44,42 @@ def write_index(
         artefacts: what was built, in the order in which it is to be shown within its section.
         missing: name of what could not be built -> the text of its `MissingRunsError`.
 
-    Returns:
-        Path of the page.
-
     Raises:
         ExneatError: a picture or a manifest cannot be read, or the page cannot be written.
     """
-    templates = jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("exneat_cli.analysis"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        keep_trailing_newline=True,
     )
-    templates.tests["numeric"] = _NUMBER.fullmatch
-    page = templates.get_template("report.html.j2").render(
-        studies=[_study(study) for study in studies.values()],
-        sections=list(_sections(directory, artefacts)),
+    environment.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
+    environment.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
+    environment.tests["numeric"] = _NUMBER.fullmatch
+    page = environment.get_template("report.html.j2").render(
+        studies=[(study, _facts(study)) for study in studies.values()],
+        sections=_sections(artefacts),
         missing=list(_missing(studies, missing)),
     )
     make_directory(directory)
     path = directory / "index.html"
-    write_whole(path, page)
+    write_whole(path, page + "\n")
     return path
 
 
-def _sections(directory: Path, artefacts: Sequence[Built]) -> Iterator[dict[str, Any]]:
+def _sections(artefacts: Sequence[Built]) -> dict[str, list[Built]]:
     """Sections that hold something; an artefact stands in the first that its name fits."""
-    left = list(artefacts)
-    for anchor, title, prefixes in _SECTIONS:
-        own = [each for prefix in prefixes for each in left if each.name.startswith(prefix)]
-        left = [each for each in left if not each.name.startswith(prefixes)]
-        if own:
-            yield {"anchor": anchor, "title": title, "artefacts": [_artefact(directory, each) for each in own]}
+    left, found = list(artefacts), {}
+    for title, prefixes in _SECTIONS.items():
+        found[title] = [each for prefix in prefixes for each in left if each.name.startswith(prefix)]
+        left = [each for each in left if each not in found[title]]
+    return {title: members for title, members in found.items() if members}
 
 
-def _artefact(directory: Path, built: Built) -> dict[str, Any]:
+def _heading(built: Built) -> str:
     kind, _, number = built.name.partition("-")
-    return {
-        "anchor": _anchor(built.name),
-        "heading": f"{kind.capitalize()} {number}: {built.title}" if number[:1].isdigit() else built.title,
-        "caption": built.caption,
-        "header": built.header,
-        "rows": built.rows,
-        "picture": _picture(built.paths),
-        "files": [(path.name, Path(os.path.relpath(path, directory)).as_posix()) for path in built.paths],
-    }
-
-
-def _anchor(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "-", name)
+    return f"{kind.capitalize()} {number}: {built.title}" if number[:1].isdigit() else built.title
 
 
 def _picture(paths: Sequence[Path]) -> str:
@@ -108,35 +94,32 @@ def _picture(paths: Sequence[Path]) -> str:
     return ""
 
 
-def _study(study: Study) -> dict[str, Any]:
+def _facts(study: Study) -> dict[str, Any]:
+    """What the runs of a study took, by variant and in all."""
+    rows = []
+    for variant, label in study.variants.items():
+        seeds = [run.seed for run in study.runs if run.variant == variant]
+        finished = sum(run.variant == variant for run in study.finished)
+        rows.append((label, str(finished), str(len(seeds)), _ranges(set(seeds))))
+    versions: dict[str, set[str]] = {}
+    for manifest in study.manifests.values():
+        for library, version in manifest.get("versions", {}).items():
+            versions.setdefault(library, set()).add(str(version))
     conditions = study.results["condition"].unique()
-    spent = [spent_in(study, condition, study.trained_variants) for condition in conditions]
     return {
-        "anchor": _anchor(f"run-{study.experiment}"),
-        "heading": study.experiment,
-        "claim": study.claim,
-        "budget": study.budget,
-        "finished": len(study.finished),
-        "planned": len(study.runs),
+        "rows": rows,
         "env_steps": f"{study.results['env_steps'].sum():,.0f}",
         "time": _duration(study.results["wall_seconds"].sum()),
-        "rows": [_variant_row(study, variant) for variant in study.variants],
-        "budgets": budget_sentence(spent),
-        "versions": _versions(study),
+        "budgets": budget_sentence([spent_in(study, each, study.trained_variants) for each in conditions]),
+        "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
-
-
-def _variant_row(study: Study, variant: str) -> tuple[str, ...]:
-    planned = [run for run in study.runs if run.variant == variant]
-    finished = sum(run.variant == variant for run in study.finished)
-    return (study.variants[variant], str(finished), str(len(planned)), _ranges({run.seed for run in planned}))
 
 
 def _ranges(seeds: set[int]) -> str:
     """Whole numbers in words, e.g. ``0 to 2, 5``."""
     parts = []
-    for _, run_of_seeds in groupby(enumerate(sorted(seeds)), key=lambda pair: pair[1] - pair[0]):
-        part = [seed for _, seed in run_of_seeds]
+    for _, pairs in groupby(enumerate(sorted(seeds)), key=lambda pair: pair[1] - pair[0]):
+        part = [seed for _, seed in pairs]
         parts.append(f"{part[0]} to {part[-1]}" if len(part) > 1 else str(part[0]))
     return ", ".join(parts)
 
@@ -146,14 +129,6 @@ def _duration(seconds: float) -> str:
     if minutes < 1:
         return f"{seconds:.0f} s"
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
-
-
-def _versions(study: Study) -> str:
-    found: dict[str, set[str]] = {}
-    for manifest in study.manifests.values():
-        for library, version in manifest.get("versions", {}).items():
-            found.setdefault(library, set()).add(str(version))
-    return ", ".join(f"{library} {' and '.join(sorted(versions))}" for library, versions in found.items())
 
 
 def _missing(studies: Mapping[str, Study], missing: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:

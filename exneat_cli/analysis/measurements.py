@@ -17,12 +17,7 @@ _SUMMARY = ["experiment", "condition", "variant", "quantity", "runs", *STATISTIC
 
 
 def summarise(study: Study, conditions: Iterable[str], columns: Mapping[str, Column]) -> pd.DataFrame:
-    """Summarise every quantity of every variant in each condition, measured or not.
-
-    Args:
-        study: what was run.
-        conditions: some of its conditions; variants are compared within each.
-        columns: name of a quantity -> what it is.
+    """Summarise the quantities named in `columns`, of every variant of the study; they are compared within conditions.
 
     Returns:
         One row per condition, quantity and variant. Columns: experiment, condition, variant, quantity, those of
@@ -39,7 +34,7 @@ def summarise(study: Study, conditions: Iterable[str], columns: Mapping[str, Col
             else:
                 groups = {variant: runs.droplevel(0) for variant, runs in measured[name].dropna().groupby(level=0)}
                 values = {variant: groups.get(variant, pd.Series(dtype=float)) for variant in study.variants}
-                part = compare(values, study.baselines)
+                part = compare({variant: each.to_numpy() for variant, each in values.items()}, study.baselines)
                 if column.of == "robustness":
                     part["best_5"] = [_mean_of_best(study, condition, *each) for each in values.items()]
             place = {"experiment": study.experiment, "condition": condition, "quantity": name}

@@ -47,13 +47,7 @@ def draw_network(run: RunDirectory) -> list[Path]:
 
 
 def champions_figure(title: str, graphs: Sequence[ChampionGraph], titles: Sequence[str] = ()) -> Figure:
-    """Draw champions side by side, with a legend.
-
-    Args:
-        title: of the figure.
-        graphs: the champions.
-        titles: of each; none leaves no room for them.
-    """
+    """Draw champions side by side, with a legend; each with a title of its own, or none."""
     sizes = [natural_size(graph) for graph in graphs]
     widths = [wide for wide, _ in sizes]
     width, height = sum(widths) + 0.3 * (len(widths) - 1), max(tall for _, tall in sizes)
@@ -92,7 +86,7 @@ def legend_entries(graphs: Sequence[ChampionGraph]) -> list[Artist]:
     thickest = " and ".join(f"{_thick_from(graph):.2g}" for graph in graphs)
     delays = {link.delayed for graph in graphs for link in graph.links}
     loops = not all(graph.feed_forward for graph in graphs)
-    entries = {
+    entries: dict[str, styles.Look] = {
         "positive weight": {"color": POSITIVE, "linewidth": 2.0},
         "negative weight": {"color": NEGATIVE, "linewidth": 2.0},
         f"thicker: further from 0, up to {thickest}": {"linewidth": 2.8},
@@ -108,7 +102,7 @@ def legend_entries(graphs: Sequence[ChampionGraph]) -> list[Artist]:
     return [Line2D([], [], label=label, **{"color": _GREY, **look}) for label, look in entries.items()]
 
 
-def _dot(face: str, **look: Any) -> dict[str, Any]:
+def _dot(face: str, **look: Any) -> styles.Look:
     return {"linestyle": "", "marker": "o", "markersize": 6.0, "markerfacecolor": face, **look}
 
 
@@ -118,7 +112,7 @@ def _colour(m: int) -> str:
 
 def _draw_box(axes: Axes, graph: ChampionGraph, m: int, box: Bbox) -> None:
     module = graph.plan.modules[m]
-    look: dict[str, Any] = {"facecolor": to_rgba(_colour(m), 0.07), "edgecolor": to_rgba(_colour(m), 0.8)}
+    look: styles.Look = {"facecolor": to_rgba(_colour(m), 0.07), "edgecolor": to_rgba(_colour(m), 0.8)}
     corner, width, height = (box.x0 + 0.05, box.y0 + 0.05), box.width - 0.1, box.height - 0.1
     axes.add_patch(FancyBboxPatch(corner, width, height, boxstyle="round,pad=0.05", linewidth=1.0, zorder=0, **look))
     sharers = sum(other.subpopulation == module.subpopulation for other in graph.plan.modules)
@@ -162,7 +156,7 @@ def _draw_edges(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> Non
         is_used = {(m, edge.source), (m, edge.target)} <= graph.used
         opacity = 0.16 + 0.74 * share**contrast if is_used else FAINT
         colour = to_rgba(POSITIVE if edge.weight >= 0 else NEGATIVE, opacity)
-        look: dict[str, Any] = {"edgecolor": colour, "linewidth": 0.3 + thickest * share, "zorder": 2}
+        look: styles.Look = {"edgecolor": colour, "linewidth": 0.3 + thickest * share, "zorder": 2}
         if end[1] > start[1]:
             lines.append([start, end])
             widths.append(look["linewidth"])
@@ -185,10 +179,10 @@ def _draw_nodes(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> Non
     )
     for keys, marker, face, size in groups:
         opacity = [1.0 if (m, key) in graph.used else 2 * FAINT for key in keys]
-        look = {"c": [to_rgba(face, alpha) for alpha in opacity], "edgecolors": [to_rgba(_GREY, a) for a in opacity]}
+        faces, rims = ([to_rgba(colour, alpha) for alpha in opacity] for colour in (face, _GREY))
         if keys:
             x, y = zip(*(places[key] for key in keys), strict=True)
-            axes.scatter(x, y, s=size, marker=marker, linewidths=0.7, zorder=3, **look)
+            axes.scatter(x, y, size, faces, marker=marker, edgecolors=rims, linewidths=0.7, zorder=3)
 
 
 def _name_inputs(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> None:

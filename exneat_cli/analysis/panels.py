@@ -26,24 +26,16 @@ AXIS_LABELS = {
 MOST_POINTS = 100
 """Points of a curve beyond these could not be told apart, but each would cost a bootstrap."""
 MARKERS_PER_CURVE = 8
-_DASHED = {"linestyle": "--", "linewidth": 1.2}
+_DASHED: Look = {"linestyle": "--", "linewidth": 1.2}
 
 
 def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
-    """Draw one panel of a figure; baselines are grey lines.
+    """Draw one panel of a figure on empty axes; returns the number of runs of each variant that it shows.
 
-    Args:
-        kind: ``training`` (means of runs with 95% bands), ``training_runs`` (each run thin, means thick), ``area`` (one
-            point per run, its mean over generations), ``robustness`` (means of runs with 95% bands; where a variant has
-            more than `BEST` runs, dashed the mean of those best on validation) or ``cluster`` (one point per run at
-            each level).
-        axes: empty.
-        panel: what it shows.
-        study: that of the panel's experiment.
-        axis: horizontal axis of training curves, one of `AXIS_LABELS`.
-
-    Returns:
-        The number of runs of each variant that it shows.
+    Kinds are ``training`` (means of runs with 95% bands), ``training_runs`` (each run thin, means thick), ``area`` (one
+    point per run, its mean over generations), ``robustness`` (means of runs with 95% bands; where a variant has more
+    than `BEST` runs, dashed the mean of those best on validation) and ``cluster`` (one point per run at each level).
+    Training curves run over `axis`, one of `AXIS_LABELS`.
 
     Raises:
         MissingRunsError: a variant has no finished run, or none has a finished sweep.
@@ -65,22 +57,20 @@ def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> 
 
 
 def common_curves(history: pd.DataFrame, axis: str) -> pd.DataFrame:
-    """Bring the runs of one variant to common places: all that every run has reached and none has passed.
+    """Bring the runs of one variant to common places on an axis: all that every run has reached and none has passed.
 
     Runs spend different numbers of control steps per generation. Between two generations a run keeps the
     value of the earlier one, which is what it had then.
 
-    Args:
-        history: of at least one run, with a column ``seed``.
-        axis: a key of `AXIS_LABELS`.
-
     Returns:
         Best fitness so far: at most `MOST_POINTS` rows, one per place, and a column per seed.
     """
-    best = history.pivot_table(index=axis, columns="seed", values="best_so_far", aggfunc="last").ffill().dropna()
+    best: pd.DataFrame = (
+        history.pivot_table(index=axis, columns="seed", values="best_so_far", aggfunc="last").ffill().dropna()
+    )
     shortest = history.groupby("seed")[axis].max().min()
-    reached = best[best.index <= max(shortest, best.index[0])]
-    return reached.iloc[np.unique(np.linspace(0, len(reached) - 1, MOST_POINTS).round().astype(int))]
+    best = best[best.index <= max(shortest, best.index[0])]
+    return best.iloc[np.unique(np.linspace(0, len(best) - 1, MOST_POINTS).round().astype(int))]
 
 
 def _draw_curves(axes: Axes, study: Study, histories: Tables, axis: str, *, each_run: bool) -> None:
@@ -91,7 +81,7 @@ def _draw_curves(axes: Axes, study: Study, histories: Tables, axis: str, *, each
                 axes.plot(run[axis], run["best_so_far"], color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
         else:
             _draw_band(axes, curves, look)
-        marks = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
+        marks: Look = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
         axes.plot(curves.index, curves.mean(axis=1), label=study.variants[variant], **look, **marks)
     axes.set(xlabel=AXIS_LABELS[axis], ylabel=f"best {study.fitness_name} so far")
     if axis == "generation":
@@ -128,7 +118,6 @@ def _swept(panel: Panel, study: Study) -> Tables:
 
 def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
     styles = variant_styles(study.variants, study.baselines)
-    some_are_chosen = False
     for variant, table in tables.items():
         axes.plot(table.index, table.mean(axis=1), label=study.variants[variant], **styles[variant])
         if variant in study.baselines:
@@ -137,8 +126,7 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None
         if table.shape[1] > BEST:
             best = [run.seed for run in study.best_first(panel.condition, variant) if run.seed in table][:BEST]
             axes.plot(table.index, table[best].mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
-            some_are_chosen = True
-    if some_are_chosen:
+    if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
 

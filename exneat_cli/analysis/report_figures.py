@@ -31,13 +31,9 @@ _KEY_WIDTH, _LETTER_WIDTH = 0.6, 0.075
 
 
 def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path, axis: str = "generation") -> Built:
-    """Draw one figure of the catalogue as PNG and SVG.
+    """Draw one figure of the catalogue as ``<name>.png`` and ``<name>.svg`` in `directory`.
 
-    Args:
-        plan: what to draw.
-        studies: by name of experiment; must hold those of all panels.
-        directory: where ``<name>.png`` and ``<name>.svg`` go.
-        axis: horizontal axis of training curves: ``generation``, ``episodes`` or ``env_steps``.
+    `studies` are by the name of their experiment; training curves run over `axis`, one of `AXES`.
 
     Raises:
         MissingRunsError: it needs runs that are not there.

@@ -12,49 +12,40 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from exneat_cli.analysis import styles
 from exneat_cli.analysis.study import read_csv
-from exneat_cli.analysis.styles import BLUE, GREEN, GREY, VERMILION, new_figure, save_figure, style, tick_levels
 from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory, read_robustness
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
 MOST_COLUMNS = 3
-_CURVES = {
+_CURVES: dict[str, styles.Look] = {
     "best_so_far": {"label": "best so far", "color": "#222222", "linewidth": 1.2, "linestyle": "--"},
-    "best_fitness": {"label": "best of the generation", "color": BLUE, "linewidth": 1.8},
-    "mean_fitness": {"label": "mean", "color": VERMILION, "linewidth": 1.8},
-    "median_fitness": {"label": "median", "color": GREEN, "linewidth": 1.2},
+    "best_fitness": {"label": "best of the generation", "color": styles.BLUE, "linewidth": 1.8},
+    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8},
+    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2},
 }
 
 
 def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
-    """Draw best, mean and median fitness per generation, and the best so far, as PNG and SVG.
-
-    Args:
-        run: whose history.csv is drawn.
-        fitness_name: label of the vertical axis, e.g. ``forward reward``.
-    """
+    """Draw the fitness per generation in a run's history.csv, as PNG and SVG; `fitness_name` is its label."""
     history = read_csv(run.history, HistoryRow._fields)
-    with style():
-        figure = new_figure(7.0, 4.2)
+    with styles.style():
+        figure = styles.new_figure(7.0, 4.2)
         axes = figure.add_subplot()
         for column, look in _CURVES.items():
             axes.plot(history["generation"], history[column], **look)
         axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper left")
-    return save_figure(figure, run.plots / "training")
+    return styles.save_figure(figure, run.plots / "training")
 
 
 def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: str) -> list[Path]:
-    """Draw fitness at each level of each sweep in robustness.csv, as PNG and SVG; no files if it holds no sweep.
+    """Draw fitness at each level of each sweep in a run's robustness.csv, as PNG and SVG; no files without a sweep.
 
-    Of a level that was tested more than once, the row with the most episodes is shown.
-
-    Args:
-        run: whose robustness.csv is drawn.
-        labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
-        fitness_name: label of the vertical axes, e.g. ``forward reward``.
+    Of a level that was tested more than once, the row with the most episodes is shown. `labels` are those of the axes
+    by the sweeps' names, which stand in where there is none; `fitness_name` is that of the vertical axes.
     """
     tested = [row for row in read_robustness(run.robustness) if row.parameter != UNPERTURBED]
     rows = pd.DataFrame(tested, columns=RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
@@ -64,21 +55,26 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
         return []
     columns = min(len(sweeps), MOST_COLUMNS)
     lines = math.ceil(len(sweeps) / columns)
-    with style():
-        figure = new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
+    with styles.style():
+        figure = styles.new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, (sweep, levels) in zip(panels, sweeps, strict=False):
             x, mean, spread = levels["level"], levels["fitness_mean"], levels["fitness_std"]
-            band = {"color": BLUE, "alpha": 0.18, "linewidth": 0.0, "label": "one standard deviation over episodes"}
+            band = {
+                "color": styles.BLUE,
+                "alpha": 0.18,
+                "linewidth": 0.0,
+                "label": "one standard deviation over episodes",
+            }
             axes.fill_between(x, mean - spread, mean + spread, **band)
-            axes.plot(x, mean, "o-", color=BLUE, markersize=4.0, label="mean over episodes")
-            tick_levels(axes, x)
-            axes.set(xlabel=labels.get(sweep, sweep), ylabel=fitness_name)
+            axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
+            styles.tick_levels(axes, x)
+            axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
         for axes in panels[len(sweeps) :]:
             axes.remove()
         figure.suptitle(f"{run.path.name}: robustness")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return save_figure(figure, run.plots / "robustness")
+    return styles.save_figure(figure, run.plots / "robustness")
 
 
 def draw_path(run: RunDirectory) -> list[Path]:
@@ -89,21 +85,21 @@ def draw_path(run: RunDirectory) -> list[Path]:
     """
     trace = read_csv(run.trace)
     title = f"{run.path.name}: first test episode"
-    with style():
+    with styles.style():
         if run.tiles.exists():
             figure = _on_tiles(trace, read_csv(run.tiles))
             figure.suptitle(title)
         else:
             figure = _on_ground(trace, title)
-    return save_figure(figure, run.plots / "path")
+    return styles.save_figure(figure, run.plots / "path")
 
 
 def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
-    figure = new_figure(7.0, 3.6)
+    figure = styles.new_figure(7.0, 3.6)
     axes = figure.add_subplot()
     axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
     points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
-    axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=VERMILION, label="start", zorder=3)
+    axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
     axes.set(title=title, xlabel="x, ahead (m)", ylabel="y, left (m)")
     axes.set_aspect("equal", adjustable="datalim")
     figure.colorbar(points, ax=axes, label="control step")
@@ -112,7 +108,7 @@ def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
 
 
 def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
-    figure = new_figure(9.0, 4.4)
+    figure = styles.new_figure(9.0, 4.4)
     grid = tiles.pivot(index="row", columns="column")
     prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
     for channel, axes in enumerate(figure.subplots(1, 2), start=1):
@@ -121,11 +117,11 @@ def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
         for name in prey[:MOST_PREY]:
             _draw_prey(axes, trace, name)
         if "goal_row" in trace:
-            axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color=GREEN, markersize=12)
-        axes.plot(trace["column"], trace["row"], "-", color=BLUE, linewidth=2.0)
+            axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color=styles.GREEN, markersize=12)
+        axes.plot(trace["column"], trace["row"], "-", color=styles.BLUE, linewidth=2.0)
         for place, marker, label in ((0, "o", "start"), (-1, "s", "end")):
-            axes.plot(trace["column"].iloc[place], trace["row"].iloc[place], marker, color=BLUE, label=label)
-        axes.set(title=f"channel {channel}", xticks=[], yticks=[], facecolor=GREY)
+            axes.plot(trace["column"].iloc[place], trace["row"].iloc[place], marker, color=styles.BLUE, label=label)
+        axes.set(title=f"channel {channel}", xticks=[], yticks=[], facecolor=styles.GREY)
         axes.grid(visible=False)
         figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -134,6 +130,6 @@ def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
 
 def _draw_prey(axes: Axes, trace: pd.DataFrame, prey: str) -> None:
     free = trace[trace[f"{prey}_free"] == 1]
-    axes.plot(free[f"{prey}_column"], free[f"{prey}_row"], "-", color=GREEN, linewidth=1.0)
+    axes.plot(free[f"{prey}_column"], free[f"{prey}_row"], "-", color=styles.GREEN, linewidth=1.0)
     last = trace.iloc[min(len(free), len(trace) - 1)]
-    axes.plot(last[f"{prey}_column"], last[f"{prey}_row"], "x" if len(free) < len(trace) else ".", color=GREEN)
+    axes.plot(last[f"{prey}_column"], last[f"{prey}_row"], "x" if len(free) < len(trace) else ".", color=styles.GREEN)

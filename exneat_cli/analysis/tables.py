@@ -27,12 +27,7 @@ _PLACE = ["condition", "variant", "quantity", "published"]
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
-    """Write one table of the catalogue as ``<name>.csv`` and ``<name>.md``: one line per row and column of the plan.
-
-    Args:
-        plan: which variants and quantities.
-        studies: by the name of their experiment.
-        directory: where the files go; made if need be.
+    """Write ``<name>.csv`` and ``<name>.md`` into `directory`: one line per row and column of the plan.
 
     Raises:
         MissingRunsError: a variant of the table, or the one that it is compared with, lacks runs or a level.
@@ -40,7 +35,7 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     """
     lines = _planned_lines(plan, studies)
     of = {column.of for column in plan.columns.values()}
-    sentences = []
+    sentences: list[str] = []
     for experiment, own in lines.groupby("experiment", sort=False):
         sentences += table_sentences(studies[str(experiment)], own, of)
     best = {}
@@ -83,18 +78,14 @@ def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFram
     for (experiment, condition, quantity), own in unmeasured.groupby(["experiment", "condition", "quantity"]):
         study, column = studies[str(experiment)], plan.columns[str(quantity)]
         labels = ", ".join(own["variant"].map(study.variants))
-        raise study.lacking(condition, f"sweep {column.sweep}, level {column.level}: not measured for {labels}")
+        raise study.lacking(str(condition), f"sweep {column.sweep}, level {column.level}: not measured for {labels}")
     return lines
 
 
 def build_comparison(study: Study, directory: Path) -> Built:
-    """Write ``comparison-<experiment>.csv`` and ``.md``: one line per condition and variant, trained or not.
+    """Write ``comparison-<experiment>.csv`` and ``.md`` into `directory`: one line per condition and variant.
 
     Conditions without a finished run are left out. Where the first variant has none, nothing is compared with it.
-
-    Args:
-        study: what was run.
-        directory: where the files go; made if need be.
 
     Raises:
         MissingRunsError: no run is finished at all.
@@ -118,7 +109,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
     lines = summarise(study, conditions, columns)
     labelled = _labelled(lines, {study.experiment: study})
     name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
-    words = Built(name, title, " ".join(table_sentences(study, lines, columns)), ())
+    words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
     return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
 
 
