@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -129,19 +129,15 @@ def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:
     plans: dict[str, FigurePlan | TablePlan] = {}
     for name, entry in read_yaml(path).items():
         try:
-            plans[str(name)] = _plan(str(name), entry)
+            if not isinstance(entry, dict):
+                raise ExneatError(f"expected keys with values, got {entry!r}")
+            check_choice("kind", entry.get("kind"), (*FIGURE_KINDS, "table"))
+            named = {**entry, "name": str(name)}
+            schema: type[FigurePlan | TablePlan] = TablePlan if entry["kind"] == "table" else FigurePlan
+            plans[str(name)] = msgspec.convert(named, schema)
         except (msgspec.ValidationError, ExneatError) as error:
             raise ExneatError(f"{path}: {name}: {_reason(str(error))}") from error
     return plans
-
-
-def _plan(name: str, entry: Any) -> FigurePlan | TablePlan:
-    if not isinstance(entry, dict):
-        raise ExneatError(f"expected keys with values, got {entry!r}")
-    kind = entry.get("kind")
-    check_choice("kind", kind, (*FIGURE_KINDS, "table"))
-    named = {**entry, "name": name}
-    return msgspec.convert(named, TablePlan) if kind == "table" else msgspec.convert(named, FigurePlan)
 
 
 def _reason(message: str) -> str:

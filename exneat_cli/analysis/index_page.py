@@ -9,7 +9,7 @@ import base64
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +100,7 @@ def _facts(study: Study) -> dict[str, Any]:
     for variant, label in study.variants.items():
         seeds = [run.seed for run in study.runs if run.variant == variant]
         finished = sum(run.variant == variant for run in study.finished)
-        rows.append((label, str(finished), str(len(seeds)), _ranges(set(seeds))))
+        rows.append((label, str(finished), str(len(seeds)), f"{min(seeds)} to {max(seeds)}" if seeds else ""))
     versions: dict[str, set[str]] = {}
     for manifest in study.manifests.values():
         for library, version in manifest.get("versions", {}).items():
@@ -109,26 +109,10 @@ def _facts(study: Study) -> dict[str, Any]:
     return {
         "rows": rows,
         "env_steps": f"{study.results['env_steps'].sum():,.0f}",
-        "time": _duration(study.results["wall_seconds"].sum()),
+        "time": timedelta(seconds=round(study.results["wall_seconds"].sum())),
         "budgets": budget_sentence([spent_in(study, each, study.trained_variants) for each in conditions]),
         "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
-
-
-def _ranges(seeds: set[int]) -> str:
-    """Whole numbers in words, e.g. ``0 to 2, 5``."""
-    parts = []
-    for _, pairs in groupby(enumerate(sorted(seeds)), key=lambda pair: pair[1] - pair[0]):
-        part = [seed for _, seed in pairs]
-        parts.append(f"{part[0]} to {part[-1]}" if len(part) > 1 else str(part[0]))
-    return ", ".join(parts)
-
-
-def _duration(seconds: float) -> str:
-    minutes = round(seconds / 60.0)
-    if minutes < 1:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def _missing(studies: Mapping[str, Study], missing: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:

@@ -52,7 +52,7 @@ def champions_figure(title: str, graphs: Sequence[ChampionGraph], titles: Sequen
     widths = [wide for wide, _ in sizes]
     width, height = sum(widths) + 0.3 * (len(widths) - 1), max(tall for _, tall in sizes)
     with styles.style():
-        figure = styles.new_figure(width, height + (1.6 if titles else 1.0))
+        figure = Figure(figsize=(width, height + (1.6 if titles else 1.0)), layout="constrained")
         panels = figure.subplots(1, len(graphs), squeeze=False, width_ratios=widths)[0]
         for axes, graph, wide in zip(panels, graphs, widths, strict=True):
             draw_champion(axes, graph, wide, height)

@@ -52,9 +52,18 @@ def natural_size(graph: ChampionGraph) -> tuple[float, float]:
 
 
 def lay_out(graph: ChampionGraph, width: float, height: float) -> tuple[list[Bbox], list[Places]]:
-    """Place every module, and the nodes within it, on a page of the given size."""
-    boxes = _boxes(page_direction(graph.plan.modules), width, height)
-    return boxes, [_places(graph, m, box) for m, box in enumerate(boxes)]
+    """Place every module in a box, and the nodes within it, on a page of the given size; rows of boxes are centred."""
+    rows = _rows(page_direction(graph.plan.modules))
+    columns = max(len(row) for row in rows)
+    box_width = (width - (columns - 1) * GAP) / columns
+    box_height = (height - (len(rows) - 1) * GAP) / len(rows)
+    boxes: dict[int, Bbox] = {}
+    for r, row in enumerate(rows):
+        left = (width - len(row) * box_width - (len(row) - 1) * GAP) / 2
+        bottom = height - (r + 1) * box_height - r * GAP
+        for c, m in enumerate(row):
+            boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
+    return [boxes[m] for m in sorted(boxes)], [_places(graph, m, boxes[m]) for m in sorted(boxes)]
 
 
 def input_groups(graph: ChampionGraph, m: int) -> list[list[int]]:
@@ -96,21 +105,6 @@ def _rows(directions: Sequence[tuple[float, float]]) -> list[list[int]]:
         else:
             rows.append([m])
     return [sorted(row, key=lambda m: (directions[m][0], m)) for row in rows]
-
-
-def _boxes(directions: Sequence[tuple[float, float]], width: float, height: float) -> list[Bbox]:
-    """Equal boxes in rows; each row is centred."""
-    rows = _rows(directions)
-    columns = max(len(row) for row in rows)
-    box_width = (width - (columns - 1) * GAP) / columns
-    box_height = (height - (len(rows) - 1) * GAP) / len(rows)
-    boxes = {}
-    for r, row in enumerate(rows):
-        left = (width - len(row) * box_width - (len(row) - 1) * GAP) / 2
-        for c, m in enumerate(row):
-            bottom = height - (r + 1) * box_height - r * GAP
-            boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
-    return [boxes[m] for m in range(len(directions))]
 
 
 def _places(graph: ChampionGraph, m: int, box: Bbox) -> Places:

@@ -27,6 +27,7 @@ MOST_POINTS = 100
 """Points of a curve beyond these could not be told apart, but each would cost a bootstrap."""
 MARKERS_PER_CURVE = 8
 _DASHED: Look = {"linestyle": "--", "linewidth": 1.2}
+_BAR: Look = {"color": GREY, "linewidth": 2.4}
 
 
 def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
@@ -94,7 +95,7 @@ def _draw_areas(axes: Axes, study: Study, histories: Tables) -> None:
     for place, (variant, look) in enumerate(variant_styles(study.trained_variants).items()):
         areas = histories[variant].groupby("seed")["best_so_far"].mean().to_frame().T
         _draw_points(axes, np.array([place]), areas, look, study.variants[variant], room=0.7, size=40)
-    _explain_bars(axes)
+    axes.plot([], [], label="bar: mean over runs", **_BAR)
     axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
     axes.margins(x=0.08)
 
@@ -147,7 +148,7 @@ def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables) -> No
         else:
             aside = (trained.index(variant) - (len(trained) - 1) / 2) * room
             _draw_points(axes, places + aside, table, look, label, room, size=12)
-    _explain_bars(axes)
+    axes.plot([], [], label="bar: mean over runs", **_BAR)
     axes.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
     axes.set_xlim(-0.6, len(levels) - 0.4)
     axes.grid(visible=False, axis="x")
@@ -168,7 +169,3 @@ def _draw_points(
     dots = {"color": look["color"], "marker": look["marker"], "label": label}
     axes.scatter((places[:, None] + aside).ravel(), table.to_numpy().ravel(), s=size, alpha=0.7, linewidths=0.0, **dots)
     axes.hlines(table.mean(axis=1), places - 0.42 * room, places + 0.42 * room, color=look["color"], linewidth=2.0)
-
-
-def _explain_bars(axes: Axes) -> None:
-    axes.plot([], [], color=GREY, linewidth=2.4, label="bar: mean over runs")

@@ -14,7 +14,7 @@ from exneat_cli.analysis.network_data import read_champion_graph
 from exneat_cli.analysis.network_graph import champions_figure
 from exneat_cli.analysis.panels import AXIS_LABELS, draw_panel
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study
-from exneat_cli.analysis.styles import new_figure, save_figure, style
+from exneat_cli.analysis.styles import save_figure, style
 from exneat_cli.errors import ExneatError, check_choice
 
 AXES = tuple(AXIS_LABELS)
@@ -85,7 +85,7 @@ def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> t
     width, height = sizes.get(len(plan.panels), (4.8 * len(plan.panels), 4.8))
     counts = []
     with style():
-        figure = new_figure(width, height)
+        figure = Figure(figsize=(width, height), layout="constrained")
         for axes, panel in zip(figure.subplots(1, len(plan.panels), squeeze=False)[0], plan.panels, strict=True):
             study = studies[panel.experiment]
             counts.append(draw_panel(plan.kind, axes, panel, study, axis))

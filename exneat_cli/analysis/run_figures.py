@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -31,7 +30,7 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
     """Draw the fitness per generation in a run's history.csv, as PNG and SVG; `fitness_name` is its label."""
     history = read_csv(run.history, HistoryRow._fields)
     with styles.style():
-        figure = styles.new_figure(7.0, 4.2)
+        figure = Figure(figsize=(7.0, 4.2), layout="constrained")
         axes = figure.add_subplot()
         for column, look in _CURVES.items():
             axes.plot(history["generation"], history[column], **look)
@@ -56,7 +55,7 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
     columns = min(len(sweeps), MOST_COLUMNS)
     lines = math.ceil(len(sweeps) / columns)
     with styles.style():
-        figure = styles.new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
+        figure = Figure(figsize=(max(6.2, 3.6 * columns), 3.0 * lines + 0.9), layout="constrained")
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, (sweep, levels) in zip(panels, sweeps, strict=False):
             x, mean, spread = levels["level"], levels["fitness_mean"], levels["fitness_std"]
@@ -95,7 +94,7 @@ def draw_path(run: RunDirectory) -> list[Path]:
 
 
 def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
-    figure = styles.new_figure(7.0, 3.6)
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
     axes = figure.add_subplot()
     axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
     points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
@@ -108,14 +107,17 @@ def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
 
 
 def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
-    figure = styles.new_figure(9.0, 4.4)
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     grid = tiles.pivot(index="row", columns="column")
     prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
     for channel, axes in enumerate(figure.subplots(1, 2), start=1):
         cues = np.ma.masked_where(grid["path"] == 0, grid[f"channel_{channel}"])
         picture = axes.imshow(cues, cmap="YlOrBr", vmin=0.0)
         for name in prey[:MOST_PREY]:
-            _draw_prey(axes, trace, name)
+            row, column, is_free = trace[f"{name}_row"], trace[f"{name}_column"], trace[f"{name}_free"] == 1
+            axes.plot(column[is_free], row[is_free], "-", color=styles.GREEN, linewidth=1.0)
+            end = min(is_free.sum(), len(trace) - 1)
+            axes.plot(column.iloc[end], row.iloc[end], "." if is_free.all() else "x", color=styles.GREEN)
         if "goal_row" in trace:
             axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color=styles.GREEN, markersize=12)
         axes.plot(trace["column"], trace["row"], "-", color=styles.BLUE, linewidth=2.0)
@@ -126,10 +128,3 @@ def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
         figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
-
-
-def _draw_prey(axes: Axes, trace: pd.DataFrame, prey: str) -> None:
-    free = trace[trace[f"{prey}_free"] == 1]
-    axes.plot(free[f"{prey}_column"], free[f"{prey}_row"], "-", color=styles.GREEN, linewidth=1.0)
-    last = trace.iloc[min(len(free), len(trace) - 1)]
-    axes.plot(last[f"{prey}_column"], last[f"{prey}_row"], "x" if len(free) < len(trace) else ".", color=styles.GREEN)

@@ -7,12 +7,12 @@ runs with other settings never slip in, whatever else lies in the same folder.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from exneat_cli.errors import ExneatError
@@ -54,7 +54,7 @@ class Study:
         claim: what it is to show, in one sentence.
         command: the command line that makes what is missing.
         fitness_name: what the task's fitness is, in words.
-        has_full_reward: whether the task has a second figure.
+        has_full_reward: whether the task has a second score.
         variants: name -> label, in the order of legends; the first is what others are compared with.
         baselines: names of those variants that nothing trains.
         conditions: name -> label.
@@ -145,11 +145,8 @@ class Study:
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-
-        def validation(run: PlannedRun) -> float:
-            return float(self.manifests[run]["result"].get("validation", -np.inf))
-
-        return sorted(self.of(condition, variant), key=validation, reverse=True)
+        validation = {run: manifest["result"].get("validation", -math.inf) for run, manifest in self.manifests.items()}
+        return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""

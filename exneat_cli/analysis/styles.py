@@ -99,11 +99,6 @@ def tick_levels(axes: Axes, levels: Iterable[float]) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of the given size in inches."""
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def save_figure(figure: Figure, path: Path) -> list[Path]:
     """Write ``path.png`` and ``path.svg``, also where the name has dots of its own; returns both paths.
 

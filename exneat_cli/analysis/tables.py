@@ -123,10 +123,9 @@ def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) 
 
 def _labelled(lines: pd.DataFrame, studies: Mapping[str, Study]) -> pd.DataFrame:
     """Lines with the labels of conditions and variants in place of their names."""
-    of = [studies[experiment] for experiment in lines["experiment"]]
-    conditions = [study.conditions[name] for study, name in zip(of, lines["condition"], strict=True)]
-    variants = [study.variants[name] for study, name in zip(of, lines["variant"], strict=True)]
-    return lines.assign(condition=conditions, variant=variants)
+    places = lines[["experiment", "condition", "variant"]].itertuples(index=False, name=None)
+    labels = [(studies[e].conditions[condition], studies[e].variants[variant]) for e, condition, variant in places]
+    return lines.assign(condition=[label for label, _ in labels], variant=[label for _, label in labels])
 
 
 def _printed(lines: pd.DataFrame) -> pd.DataFrame:
