@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -15,7 +15,7 @@ import yaml
 from exneat_cli.algorithms import Team
 from exneat_cli.brains import Brain, RandomActions, assemble, motionless
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import before_the_end, heeding
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import (
     DONE,
     FAILED,
@@ -101,35 +101,26 @@ def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress
         _tell_other_versions(before, progress)
         manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
         directory.forget_what_was_derived()
-    with _marking_interruption(directory):
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
-        try:
-            with heeding():
-                result = _do(settings, directory, progress)
-        except Exception as error:
-            with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-                directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
-            raise
-        finally:
-            progress.stop()
-        directory.update_manifest(status=DONE, finished=_now(), result=result)
-
-
-@contextlib.contextmanager
-def _marking_interruption(directory: RunDirectory) -> Iterator[None]:
-    """Whoever looks at the run later is told that it was interrupted amid the block."""
-
-    def mark() -> None:
-        if directory.read_manifest().get("status") == RUNNING:
-            directory.update_manifest(status=INTERRUPTED)
-
     try:
-        with before_the_end(mark):
-            yield
-    except KeyboardInterrupt:
-        with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure
-            mark()
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        result = _do(settings, directory, progress)
+        directory.update_manifest(status=DONE, finished=_now(), result=result)
+    except (Exception, KeyboardInterrupt) as error:
+        _mark_unfinished(directory, error)
         raise
+    finally:
+        progress.stop()
+
+
+def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
+    interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+        if directory.read_manifest().get("status") != RUNNING:
+            return
+        if interrupted:
+            directory.update_manifest(status=INTERRUPTED)
+        else:
+            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
 
 
 def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:
@@ -167,6 +158,8 @@ def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> d
         return _test_baseline(settings, directory)
 
     def report(history: list[HistoryRow]) -> None:
+        if signal_heard() is not None:  # Python drops the exception that comes up in a callback of a weak reference
+            raise KeyboardInterrupt
         write_history(directory.history, history)
         progress.generation(history[-1])
 
