@@ -8,9 +8,7 @@ raise another error instead (`signal_heard`), and the workers of Hydra's launche
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import fcntl
-import multiprocessing
 import os
 import signal
 import threading
@@ -68,13 +66,13 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def launching(workplace: Path) -> Iterator[None]:
-    """For whoever starts workers: these do not hear the terminal's Ctrl-C, and a signal ends their jobs first.
+    """For whoever starts workers: they do not hear the terminal's Ctrl-C, and a signal ends their jobs first.
 
     Args:
-        workplace: a directory that workers lock while they do a job, see `as_worker`.
+        workplace: a directory of this machine, which workers lock during a job.
     """
     global _workplace
-    from multiprocessing import resource_tracker  # here, for it takes longer to import than --help to answer
+    from multiprocessing import resource_tracker  # takes longer to import than --help to answer
 
     resource_tracker.ensure_running()  # its first start would unblock the signals
     over = threading.Event()
@@ -93,11 +91,10 @@ def launching(workplace: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def as_worker(workplace: Path) -> Iterator[None]:
-    """For a job in a worker process: SIGTERM interrupts it, and the process ends with its parent.
+    """For a job in a worker: SIGTERM interrupts it and refuses the next, and the process ends with its parent."""
+    import ctypes
+    import multiprocessing
 
-    Raises:
-        KeyboardInterrupt: also at once, if a job before was interrupted.
-    """
     if _heard is not None:
         raise KeyboardInterrupt
     with contextlib.suppress(AttributeError):  # Linux alone has it

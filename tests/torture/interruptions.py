@@ -150,7 +150,7 @@ def _judge(
     errors = program.errors.strip()
     if code == 0:
         return _Stop(0.0 if not running else seconds, left, files, "done before")
-    if "exneat" not in errors and (code == -kind or "KeyboardInterrupt" in errors):
+    if code == -kind and "in program" not in errors and "exneat:" not in errors:
         return _Stop(seconds, left, files, "ended before exneat had begun")
     if code != _CODES[signal.Signals(kind)]:
         mistakes.add(f"{name}: exit code {code}: {errors[-300:]}")
