@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brain, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.interruption import finishing
 from exneat_cli.records import (
     DONE,
     MANIFEST_FORMAT,
@@ -137,10 +136,9 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
     rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
     failed = [each.failed_episodes for each in scores.values()]
     named = [f"{sweep.name}={row.level!r}, {row.episodes} episodes" for row in rows]
-    with finishing():
-        # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
-        _count_failures(directory, dict(zip(named, failed, strict=True)))
-        merge_robustness(directory.robustness, rows)
+    # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+    _count_failures(directory, dict(zip(named, failed, strict=True)))
+    merge_robustness(directory.robustness, rows)
 
 
 def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import (
     DONE,
     FAILED,
@@ -97,6 +98,8 @@ def train(
 
 def _save(directory: RunDirectory, training: Training) -> None:
     """Write down the generation that is done."""
+    if signal_heard() is not None:  # Python drops an exception that comes up in a callback of a weak reference
+        raise KeyboardInterrupt
     write_history(directory.history, training.history)
     if training.is_over or len(training.history) % training.settings.checkpoint_every == 0:
         write_checkpoint(directory.path, training.checkpoint(), training.settings.full_hash)
@@ -119,17 +122,22 @@ def _recorded(
         progress.start(directory.path.name, settings.generations)
         yield result
         directory.update_manifest(status=DONE, finished=_now(), result=result)
-    except BaseException as error:
-        with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-            if not directory.is_there() or directory.read_manifest().get("status") != RUNNING:
-                pass
-            elif isinstance(error, KeyboardInterrupt):
-                directory.update_manifest(status=INTERRUPTED)
-            else:
-                directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+    except (Exception, KeyboardInterrupt) as error:
+        _mark_unfinished(directory, error)
         raise
     finally:
         progress.stop()
+
+
+def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
+    interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+        if not directory.is_there() or directory.read_manifest().get("status") != RUNNING:
+            return
+        if interrupted:
+            directory.update_manifest(status=INTERRUPTED)
+        else:
+            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
 
 
 def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:

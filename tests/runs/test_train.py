@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -124,17 +125,19 @@ def test_a_finished_run_is_found_not_trained_again(tmp_path: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in first.directory.path.iterdir()} == before
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_an_interrupted_run_can_be_done_again_with_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     undisturbed = train(tiny(tmp_path / "a"))
 
     def interrupt(*arguments: object) -> None:
-        raise KeyboardInterrupt
+        patch.setattr("exneat_cli.runs.run.signal_heard", lambda: signal.SIGINT)
+        raise error
 
     with monkeypatch.context() as patch:
         patch.setattr("exneat_cli.runs.run.write_history", interrupt)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(error):
             train(tiny(tmp_path / "b"))
     directory = tiny(tmp_path / "b").directory
     assert directory.read_manifest()["status"] == "interrupted"
