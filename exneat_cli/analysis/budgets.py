@@ -27,10 +27,10 @@ def spent_in(study: Study, condition: str, variants: Iterable[str]) -> dict[str,
     found = {}
     for variant in variants:
         manifests = [run.directory.read_manifest() for run in study.of(condition, variant)]
-        budgets = [manifest["budget_spent"] for manifest in manifests if "budget_spent" in manifest]
+        budgets = [manifest.budget_spent for manifest in manifests if manifest.budget_spent]
         if budgets:
             columns = [tuple(b[key] for b in budgets) for key in ("episodes", "env_steps", "wall_seconds")]
-            found[study.variants[variant]] = Spent(*columns)
+            found[study.variants[variant]] = Spent(*columns)  # type: ignore[arg-type]
     return found
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from exneat_cli.analysis.artefacts import Built
 from exneat_cli.analysis.captions import budgets_sentence
 from exneat_cli.analysis.page_frame import anchor, file_links, page, picture, table, text
 from exneat_cli.analysis.study import Study
-from exneat_cli.records import make_directory, write_whole
+from exneat_cli.records import Manifest, make_directory, write_whole
 
 _SECTIONS = (
     ("chapter-4", "Chapter 4: figures", ("figure-4.",)),
@@ -87,7 +86,7 @@ def _heading(built: Built) -> str:
 
 def _run_part(study: Study) -> Iterator[str]:
     manifests = [run.directory.read_manifest() for run in study.finished]
-    spent = [manifest["budget_spent"] for manifest in manifests if "budget_spent" in manifest]
+    spent = [manifest.budget_spent for manifest in manifests if manifest.budget_spent]
     steps = sum(each["env_steps"] for each in spent)
     took = _duration(sum(each["wall_seconds"] for each in spent))
     rows = [_variant_row(study, variant) for variant in study.variants]
@@ -109,10 +108,10 @@ def _variant_row(study: Study, variant: str) -> tuple[str, ...]:
     return (study.variants[variant], str(finished), str(len(planned)), _ranges(sorted({run.seed for run in planned})))
 
 
-def _versions(manifests: Sequence[Mapping[str, Any]]) -> str:
+def _versions(manifests: Sequence[Manifest]) -> str:
     found: dict[str, set[str]] = {}
     for manifest in manifests:
-        for library, version in manifest.get("versions", {}).items():
+        for library, version in manifest.versions.items():
             found.setdefault(library, set()).add(str(version))
     return ", ".join(f"{library} {' and '.join(sorted(versions))}" for library, versions in found.items())
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, plan_from_data, read_champion_data
+from exneat_cli.records import Champion, Genome, RunDirectory, read_champion
 from exneat_cli.wiring import Plan
 
 Node = tuple[int, int]
@@ -63,56 +63,36 @@ def read_champion_graph(run: RunDirectory) -> ChampionGraph:
     """
     if not run.champion.exists():
         raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
-    content = read_champion_data(run.champion)
-    try:
-        return champion_graph(content)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise ExneatError(f"{run.champion}: damaged: {type(error).__name__}: {error}") from error
+    return champion_graph(read_champion(run.champion))
 
 
-def champion_graph(content: dict[str, Any]) -> ChampionGraph:
-    """The graph of what champion.json holds.
-
-    Raises:
-        KeyError, TypeError, ValueError, IndexError: something is missing, of the wrong type, or points nowhere.
-    """
-    plan = plan_from_data(content["plan"])
-    plan.check()
-    actuators = tuple(str(name) for name in content["actuators"])
-    if len(actuators) != plan.action_size:
-        raise ValueError(f"names {len(actuators)} actuators for {plan.action_size}")
-    genomes = [content["genomes"][module.subpopulation] for module in plan.modules]
-    nodes = [[int(node["id"]) for node in genome["nodes"]] for genome in genomes]
+def champion_graph(champion: Champion) -> ChampionGraph:
+    """The graph of what champion.json holds."""
+    plan = champion.plan
+    genomes = [champion.genomes[module.subpopulation] for module in plan.modules]
+    nodes = [sorted(node.id for node in genome.nodes) for genome in genomes]
     known = {(m, n) for m, ids in enumerate(nodes) for n in ids}
-    edges = _edges(plan, genomes, known)
+    edges = _edges(genomes)
     links = _links(plan, known)
     return ChampionGraph(
         plan=plan,
-        actuators=actuators,
-        feed_forward=bool(content["feed_forward"]),
-        hidden=tuple(
-            tuple(sorted(n for n in ids if n >= module.outputs))
-            for ids, module in zip(nodes, plan.modules, strict=True)
-        ),
+        actuators=champion.actuators,
+        feed_forward=champion.feed_forward,
+        hidden=tuple(tuple(ids[module.outputs :]) for ids, module in zip(nodes, plan.modules, strict=True)),
         edges=edges,
         links=links,
         used=_used(plan, edges, links),
-        test_fitness=float(content["scores"]["test"]["fitness_mean"]),
+        test_fitness=champion.scores.test.fitness_mean,
     )
 
 
-def _edges(plan: Plan, genomes: list[dict[str, Any]], known: set[Node]) -> tuple[Edge, ...]:
-    sources = known | {(m, -1 - k) for m, module in enumerate(plan.modules) for k in range(len(module.pins))}
-    edges = [
-        Edge((m, int(gene["from"])), (m, int(gene["to"])), float(gene["weight"]))
+def _edges(genomes: list[Genome]) -> tuple[Edge, ...]:
+    return tuple(
+        Edge((m, gene.source), (m, gene.target), gene.weight)
         for m, genome in enumerate(genomes)
-        for gene in genome["connections"]
-        if gene["enabled"]
-    ]
-    for edge in edges:
-        if edge.source not in sources or edge.target not in known:
-            raise ValueError(f"a connection between nodes that do not exist: {edge.source[1]} to {edge.target[1]}")
-    return tuple(edges)
+        for gene in genome.connections
+        if gene.enabled
+    )
 
 
 def _links(plan: Plan, known: set[Node]) -> tuple[Link, ...]:

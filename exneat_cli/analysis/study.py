@@ -9,13 +9,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import pandas as pd
 
 from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HISTORY_COLUMNS, RobustnessRow, RunDirectory
+from exneat_cli.records import HISTORY_COLUMNS, Result, RobustnessRow, RunDirectory
 
 
 class MissingRunsError(ExneatError):
@@ -90,7 +89,7 @@ class Study:
     @functools.cached_property
     def finished(self) -> tuple[PlannedRun, ...]:
         """The runs that are done."""
-        return tuple(run for run in self.runs if _is_finished(run))
+        return tuple(run for run in self.runs if run.directory.is_finished(generations=run.generations))
 
     def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
         """Finished runs of one variant in one condition, in the order of their seeds."""
@@ -134,27 +133,16 @@ class Study:
 
     def results(self, condition: str, variant: str) -> pd.DataFrame:
         """One row per finished run: seed, training (final best so far), validation, test, full_reward."""
-        rows = [
-            {"seed": run.seed, **_result(run.directory.read_manifest()["result"])}
-            for run in self.of(condition, variant)
-        ]
+        rows = [{"seed": run.seed, **_result(run.directory.read_result())} for run in self.of(condition, variant)]
         return pd.DataFrame(rows, columns=["seed", "training", "validation", "test", "full_reward"])
 
 
-def _is_finished(run: PlannedRun) -> bool:
-    if not run.directory.is_there():
-        return False
-    manifest = run.directory.read_manifest()
-    return manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
-
-
-def _result(result: Mapping[str, Any]) -> dict[str, float]:
-    champion = result["champion"]
+def _result(result: Result) -> dict[str, float]:
     return {
-        "training": result.get("training", float("nan")),
-        "validation": result.get("validation", float("nan")),
-        "test": champion["fitness_mean"],
-        "full_reward": champion["full_reward_mean"],
+        "training": float("nan") if result.training is None else result.training,
+        "validation": float("nan") if result.validation is None else result.validation,
+        "test": result.champion.fitness_mean,
+        "full_reward": result.champion.full_reward_mean,
     }
 
 

@@ -18,7 +18,6 @@ from exneat_cli.commands.experiments import Experiment, Job, budget_of, plan_job
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import heeding, scratch_directory
-from exneat_cli.records import DONE
 from exneat_cli.runs import Progress, progress_for_terminal, run_robustness, train
 
 _BASIC_LAUNCHER = "hydra._internal.core_plugins.basic_launcher.BasicLauncher"
@@ -128,8 +127,8 @@ class Launch:
         directory = finished.directory
         run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)
         draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
-        champion = finished.result["champion"]
-        return f"{settings.task.fitness_name} {champion['fitness_mean']:.{settings.task.fitness_decimals}f}"
+        champion = finished.result.champion
+        return f"{settings.task.fitness_name} {champion.fitness_mean:.{settings.task.fitness_decimals}f}"
 
     def _tell_failure(self, job: Job, reason: str) -> None:
         with contextlib.suppress(OSError):  # on another machine the directory is not there
@@ -170,6 +169,6 @@ def _unfinished_because(job: Job) -> str:
         manifest = directory.read_manifest()
     except ExneatError as error:
         return str(error)
-    if manifest.get("status") == DONE:
+    if directory.is_finished():
         return "it was trained, but not tested at every level"
-    return str(manifest.get("error", f"it did not finish (status {manifest.get('status')})"))
+    return manifest.error or f"it did not finish (status {manifest.status})"

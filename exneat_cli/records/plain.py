@@ -1,0 +1,121 @@
+"""From plain data, as JSON and YAML give it, to typed values, or to one line that says what does not fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from exneat_cli.errors import ConfigError, ExneatError, shortened
+from exneat_cli.records.files import read_text
+
+Word = Annotated[str, Meta(pattern=r"^[\w -~]{1,200}\Z")]
+"""Letters of any script, digits, and what ASCII can print."""
+Real = Annotated[float, Meta(ge=-1e300, le=1e300)]
+Count = Annotated[int, Meta(ge=0)]
+
+_Kind = TypeVar("_Kind")
+_NAMES = {"int": "whole number", "float": "number", "bool": "true or false", "str": "text", "array": "list"}
+"""Ours for msgspec's types; "object" and "null" are JSON's own."""
+
+
+def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
+    """Read a JSON object that has a field ``format``; returns it typed, and as it was.
+
+    Args:
+        path: of the file.
+        kind: a `msgspec.Struct`.
+        version: the format that this version of exneat reads.
+
+    Raises:
+        ExneatError: the file is missing, unreadable, no JSON object or of another format, or a field is missing,
+            unknown or unusable.
+    """
+    try:
+        content = msgspec.json.decode(read_text(path))
+    except RecursionError as error:
+        raise ExneatError(f"{path}: expected JSON, got something nested too deeply") from error
+    except msgspec.DecodeError as error:
+        raise ExneatError(f"{path}: expected JSON, got something else: {error}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
+    came = content.get("format")
+    if came != version or isinstance(came, bool):
+        why = "another version of exneat wrote it" if came else "exneat did not write it"
+        raise ExneatError(f"{path}: expected format {version}, got {shortened(came)}: {why}")
+    return converted(content, kind, f"{path}: damaged"), content
+
+
+def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = True) -> _Kind:
+    """Plain data as `kind`, which is whatever `msgspec.convert` knows.
+
+    Args:
+        content: from a file.
+        kind: what it should be.
+        where: begins the message.
+        strict: without it, text that reads as a number is one, as in CSV files.
+
+    Raises:
+        ExneatError: it does not fit; names the field, what was expected and what came.
+    """
+    try:
+        return msgspec.convert(content, kind, strict=strict)
+    except msgspec.ValidationError as error:
+        text, _, place = str(error).removesuffix("`").partition(" - at `$")
+        said = re.sub(r"`([^`]+)`", lambda found: " or ".join(_NAMES.get(n, n) for n in found[1].split(" | ")), text)
+        said = "".join(filter(str.isprintable, said[:1].lower() + said[1:]))[:200]
+        if said.startswith("expected"):
+            for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", place):
+                content = content[name or int(index)]
+            said = f"{said.partition(', got ')[0]}, got {shortened(content)}"
+        raise ExneatError(": ".join(part for part in (where, place.lstrip("."), said) if part)) from error
+
+
+def build(kind: type[_Kind], values: Mapping[str, Any], prefix: str = "") -> _Kind:
+    """Make a dataclass of plain data; fields that are dataclasses, or tuples of them, are made of theirs.
+
+    Args:
+        kind: the dataclass; it checks its own values.
+        values: by field; what is a dataclass already stays as it is.
+        prefix: of the keys in messages, e.g. ``noise.``.
+
+    Raises:
+        ConfigError: a section is no section, or whatever `kind` says of its values.
+        ExneatError: a key is unknown, named with the nearest valid one, or missing.
+    """
+    fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    for key, value in values.items():
+        if key not in fields:
+            close = difflib.get_close_matches(str(key), fields, n=1, cutoff=0.5)
+            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(fields)
+            raise ExneatError(f"{prefix}{shortened(key)[1:-1]}: unknown key (value {shortened(value)})\n  {hint}")
+    for name, field in fields.items():
+        if name not in values and field.default is field.default_factory is dataclasses.MISSING:
+            raise ExneatError(f"{prefix}{name}: is missing")
+    hints = get_type_hints(kind)
+    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in values.items()})
+
+
+def _made(hint: Any, value: Any, key: str) -> Any:
+    if dataclasses.is_dataclass(hint) and not dataclasses.is_dataclass(value):
+        return build(hint, section(key, value), f"{key}.")  # type: ignore[arg-type]
+    if get_origin(hint) is tuple and dataclasses.is_dataclass(get_args(hint)[0]):
+        return tuple(_made(get_args(hint)[0], each, f"{key}[{k}]") for k, each in enumerate(value))
+    return value
+
+
+def section(key: str, value: object) -> Mapping[str, Any]:
+    """A value that must have keys of its own.
+
+    Raises:
+        ConfigError: it has none.
+    """
+    if not isinstance(value, Mapping):
+        raise ConfigError(key, "a section with keys of its own", value)
+    return value
