@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
@@ -17,12 +18,13 @@ from exneat_cli.records.files import read_text
 
 Word = Annotated[str, Meta(pattern=r"^[\w -~]{1,200}\Z")]
 """Letters of any script, digits, and what ASCII can print."""
-Real = Annotated[float, Meta(ge=-1e300, le=1e300)]
+Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+"""Finite."""
 Count = Annotated[int, Meta(ge=0)]
 
 _Kind = TypeVar("_Kind")
-_NAMES = {"int": "whole number", "float": "number", "bool": "true or false", "str": "text", "array": "list"}
-"""Ours for msgspec's types; "object" and "null" are JSON's own."""
+_NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text", "array": "a list"}
+"""Ours for msgspec's types."""
 
 
 def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
@@ -67,11 +69,12 @@ def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = Tru
     try:
         return msgspec.convert(content, kind, strict=strict)
     except msgspec.ValidationError as error:
-        text, _, place = str(error).removesuffix("`").partition(" - at `$")
+        text, _, place = str(error).partition(" - at `$")
+        place = place.removesuffix("`")
         said = re.sub(r"`([^`]+)`", lambda found: " or ".join(_NAMES.get(n, n) for n in found[1].split(" | ")), text)
         said = "".join(filter(str.isprintable, said[:1].lower() + said[1:]))[:200]
         if said.startswith("expected"):
-            for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", place):
+            for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", place.partition("[...]")[0]):
                 content = content[name or int(index)]
             said = f"{said.partition(', got ')[0]}, got {shortened(content)}"
         raise ExneatError(": ".join(part for part in (where, place.lstrip("."), said) if part)) from error

@@ -53,7 +53,7 @@ def read_robustness(path: Path) -> list[RobustnessRow]:
             raise ValueError(f"the columns {shortened(columns)}")
     except (csv.Error, ValueError) as error:
         raise ExneatError(f"{path}: expected a table of {', '.join(RobustnessRow._fields)}, got {error}") from error
-    return converted(rows, list[RobustnessRow], f"{path}: damaged", strict=False)
+    return converted(rows, list[RobustnessRow], f"{path}: damaged, at [row][column]", strict=False)
 
 
 def merge_robustness(path: Path, rows: Sequence[RobustnessRow]) -> None:

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from exneat_cli.records import Checkpoint, read_checkpoints, write_checkpoint
+from exneat_cli.records.checkpoint import with_digest
 
 ARRAYS = {"0.current.id": np.arange(5), "0.current.node.bias": np.linspace(0.0, 1.0, 7)}
 PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}
@@ -48,7 +49,7 @@ def test_what_was_written_is_read_the_newest_first(tmp_path: Path) -> None:
 
 def test_it_is_a_plain_npz_that_needs_no_pickle(tmp_path: Path) -> None:
     with np.load(written(tmp_path), allow_pickle=False) as archive:
-        assert set(archive.files) == {*ARRAYS, "state", "digest"}
+        assert set(archive.files) == {*ARRAYS, "state"}
         assert json.loads(archive["state"].tobytes())["fitness"] == PLAIN["fitness"]
 
 
@@ -58,21 +59,15 @@ def test_a_number_that_is_not_finite_is_never_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_any_other_file_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "checkpoint-best.npz").write_bytes(b"mine")
-    written(tmp_path)
-    assert len(read(tmp_path)) == 1
-
-
 @given(position=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path, position: float, bit: int) -> None:
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_flipped_bit_is_noticed(tmp_path: Path, position: float, bit: int) -> None:
     path = written(tmp_path)
     data = bytearray(path.read_bytes())
     data[int(position * len(data))] ^= 1 << bit
     path.write_bytes(bytes(data))
     (found,) = read(tmp_path)
-    assert isinstance(found, str) or is_whole(found)
+    assert isinstance(found, str)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
@@ -87,7 +82,7 @@ def test_a_truncated_checkpoint_is_refused(tmp_path: Path, share: float) -> None
 def npz(compressed: bool = False, **members: np.ndarray) -> bytes:
     buffer = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(buffer, **members)  # type: ignore[arg-type]
-    return buffer.getvalue()
+    return with_digest(buffer.getvalue())
 
 
 def huge_shape() -> bytes:
@@ -95,9 +90,8 @@ def huge_shape() -> bytes:
     text = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000,), }".ljust(117) + b"\n"
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr("digest.npy", header + text)
         archive.writestr("state.npy", header + text)
-    return buffer.getvalue()
+    return with_digest(buffer.getvalue())
 
 
 class Bomb:
@@ -109,14 +103,14 @@ class Bomb:
 
 FOREIGN = {
     "nothing": b"",
-    "text": b"hello",
-    "JSON": b'{"format": 1}',
-    "a pickle": pickle.dumps({"a": 1}),
+    "JSON": with_digest(b'{"format": 1}'),
+    "a pickle": with_digest(pickle.dumps({"a": 1})),
     "an NPZ of something else": npz(a=np.arange(3)),
-    "an NPZ with a pickled object": npz(state=np.array([Bomb()], dtype=object), digest=np.zeros(32, np.uint8)),
-    "a compressed NPZ": npz(compressed=True, state=np.zeros(10**6, np.uint8), digest=np.zeros(32, np.uint8)),
+    "an NPZ with a pickled object": npz(state=np.array([Bomb()], dtype=object)),
+    "a compressed NPZ": npz(compressed=True, state=np.zeros(10**6, np.uint8)),
     "a shape that no memory holds": huge_shape(),
-    "a wrong digest": npz(state=np.frombuffer(b"{}", np.uint8), digest=np.zeros(32, np.uint8)),
+    "a list": npz(state=np.frombuffer(b"[1]", np.uint8)),
+    "deep JSON": npz(state=np.full(10**5, ord("["), np.uint8)),
 }
 
 

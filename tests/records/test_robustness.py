@@ -39,23 +39,13 @@ def test_the_bytes_do_not_depend_on_the_order_of_the_rows(
     assert not unique or (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "variant,run_seed\n",
-        "x\n",
-        ",".join(RobustnessRow._fields) + "\nneat,0,gap,nan,1,0,0,0,0\n",
-        "\x00",
-        "a,b\n1",
-    ],
-)
+HEADER = ",".join(RobustnessRow._fields) + "\n"
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1", "\x00", f"{HEADER}neat,0,gap,nan,1,0,0,0,0\n", f"{HEADER}neat,0\n"])
 def test_a_damaged_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robustness.csv"
+    assert read_robustness(path) == []
     path.write_text(text)
-    with pytest.raises(ExneatError, match=r"robustness\.csv: expected a table"):
+    with pytest.raises(ExneatError, match=r"robustness\.csv: (expected a table|damaged, at \[row\]\[column\])"):
         read_robustness(path)
-
-
-def test_a_file_that_is_not_there_has_no_rows(tmp_path: Path) -> None:
-    assert read_robustness(tmp_path / "robustness.csv") == []
