@@ -1,7 +1,7 @@
 """Everything on disk: layout, columns, champions, checkpoints, manifests, locks."""
 
 from exneat_cli.records import disk, provenance
-from exneat_cli.records.champion import Champion, Genome, Scores, read_champion, write_champion, write_hall_of_fame
+from exneat_cli.records.champion import Champion, Genome, Scores, read_champion, write_hall_of_fame
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, write_csv, write_json, write_whole
 from exneat_cli.records.history import HISTORY_COLUMNS, HistoryRow, write_history
@@ -16,7 +16,7 @@ from exneat_cli.records.manifest import (
     Result,
     Score,
 )
-from exneat_cli.records.plain import build, converted, section
+from exneat_cli.records.plain import build, converted
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import RunDirectory, configuration_hash, find_runs
 from exneat_cli.records.yaml_files import check_yaml, read_yaml
@@ -53,8 +53,6 @@ __all__ = [
     "read_checkpoints",
     "read_robustness",
     "read_yaml",
-    "section",
-    "write_champion",
     "write_checkpoint",
     "write_csv",
     "write_hall_of_fame",

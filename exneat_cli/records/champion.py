@@ -6,7 +6,6 @@ A champion may come from a stranger: nothing in it is run, and compiled code may
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,9 +19,9 @@ from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
 from exneat_cli.algorithms.neat.soundness import check_genes, check_genome
 from exneat_cli.brains import Brain, assemble
 from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
-from exneat_cli.records.files import write_json, write_whole
+from exneat_cli.records.files import write_whole
 from exneat_cli.records.manifest import Score
-from exneat_cli.records.plain import Real, Word, build, read_json
+from exneat_cli.records.plain import Real, Word, build, converted, read_json
 from exneat_cli.wiring import Plan
 
 CHAMPION_FORMAT = 2
@@ -115,15 +114,6 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return assemble(self.plan, [genome.in_arrays() for genome in self.genomes], feed_forward=self.feed_forward)
 
 
-def write_champion(path: Path, champion: Champion) -> None:
-    """Write a champion.
-
-    Raises:
-        ExneatError: the file cannot be written.
-    """
-    write_json(path, msgspec.to_builtins(champion))
-
-
 def read_champion(path: Path) -> Champion:
     """Read a champion, whose parts fit together.
 
@@ -147,8 +137,7 @@ def _check(champion: Champion) -> None:
     check_whole("number of modules", len(plan.modules), 1, _MOST_MODULES)
     for k, module in enumerate(plan.modules):
         key = f"plan.modules[{k}]"
-        if not re.fullmatch(r"[\w -~]{1,200}", module.name):
-            raise ConfigError(f"{key}.name", "a word", module.name)
+        converted(module.name, Word, f"{key}.name")
         check_whole(f"{key}.outputs", module.outputs, 1, _LARGEST)
         check_whole(f"{key}.hidden", module.hidden, 0, _LARGEST)
         for coordinate in module.position:

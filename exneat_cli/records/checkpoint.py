@@ -26,7 +26,7 @@ KEPT = 2
 """The newest one, and one to fall back to."""
 _LARGEST = 16 * 1024**3
 _NAME = re.compile(r"checkpoint-(\d{6,9})\.npz")
-_STATE = "state"
+_STATE, _DIGEST_SIZE = "state", hashlib.sha256().digest_size
 
 
 class Checkpoint(NamedTuple):
@@ -108,8 +108,8 @@ def _read(path: Path, generation: int, configuration_hash: str) -> Checkpoint:
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
-    archive = data[: -hashlib.sha256().digest_size]
-    if with_digest(archive) != data:
+    archive, digest = data[:-_DIGEST_SIZE], data[-_DIGEST_SIZE:]
+    if hashlib.sha256(archive).digest() != digest:
         raise ValueError("its digest is not that of its content")
     with zipfile.ZipFile(io.BytesIO(archive)) as members:
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in members.infolist()):

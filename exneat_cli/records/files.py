@@ -11,6 +11,8 @@ import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import msgspec
+
 from exneat_cli.errors import ExneatError
 
 _LARGEST_TEXT = 64 * 1024**2
@@ -57,13 +59,13 @@ def make_directory(path: Path) -> None:
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write JSON for people: indented, keys in the order given, NaN refused.
+    """Write plain data or structs as JSON for people: indented, keys in the order given, NaN refused.
 
     Raises:
         ExneatError: the file cannot be written.
         ValueError: a number is not finite.
     """
-    write_whole(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    write_whole(path, json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False) + "\n")
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

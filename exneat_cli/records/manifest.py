@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from exneat_cli.errors import ExneatError
-from exneat_cli.records.plain import Count, Real, Word, read_json
+from exneat_cli.records.plain import Count, Real, Word
 
 MANIFEST_FORMAT = 3
 RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
@@ -94,15 +92,3 @@ class Manifest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, om
     failed_robustness_episodes: dict[str, Count] = {}
     result: Result | None = None
     error: str | None = None
-
-
-def read_manifest(path: Path) -> Manifest:
-    """The manifest of a run.
-
-    Raises:
-        ExneatError: it is missing, damaged or of another format, or a finished run has no result.
-    """
-    manifest, _ = read_json(path, Manifest, MANIFEST_FORMAT)
-    if manifest.status == DONE and manifest.result is None:
-        raise ExneatError(f"{path}: damaged: result: expected the figures of a finished run, got nothing")
-    return manifest

@@ -23,7 +23,8 @@ Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Count = Annotated[int, Meta(ge=0)]
 
 _Kind = TypeVar("_Kind")
-_NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text", "array": "a list"}
+_NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text"}
+_NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
 """Ours for msgspec's types."""
 
 
@@ -80,18 +81,20 @@ def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = Tru
         raise ExneatError(": ".join(part for part in (where, place.lstrip("."), said) if part)) from error
 
 
-def build(kind: type[_Kind], values: Mapping[str, Any], prefix: str = "") -> _Kind:
+def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
     """Make a dataclass of plain data; fields that are dataclasses, or tuples of them, are made of theirs.
 
     Args:
         kind: the dataclass; it checks its own values.
-        values: by field; what is a dataclass already stays as it is.
+        values: a mapping by field; what is a dataclass already stays as it is.
         prefix: of the keys in messages, e.g. ``noise.``.
 
     Raises:
-        ConfigError: a section is no section, or whatever `kind` says of its values.
+        ConfigError: `values` is no mapping, or whatever `kind` says of them.
         ExneatError: a key is unknown, named with the nearest valid one, or missing.
     """
+    if not isinstance(values, Mapping):
+        raise ConfigError(prefix.rstrip("."), "a section with keys of its own", values)
     fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
     for key, value in values.items():
         if key not in fields:
@@ -107,18 +110,7 @@ def build(kind: type[_Kind], values: Mapping[str, Any], prefix: str = "") -> _Ki
 
 def _made(hint: Any, value: Any, key: str) -> Any:
     if dataclasses.is_dataclass(hint) and not dataclasses.is_dataclass(value):
-        return build(hint, section(key, value), f"{key}.")  # type: ignore[arg-type]
+        return build(hint, value, f"{key}.")  # type: ignore[arg-type]
     if get_origin(hint) is tuple and dataclasses.is_dataclass(get_args(hint)[0]):
         return tuple(_made(get_args(hint)[0], each, f"{key}[{k}]") for k, each in enumerate(value))
-    return value
-
-
-def section(key: str, value: object) -> Mapping[str, Any]:
-    """A value that must have keys of its own.
-
-    Raises:
-        ConfigError: it has none.
-    """
-    if not isinstance(value, Mapping):
-        raise ConfigError(key, "a section with keys of its own", value)
     return value

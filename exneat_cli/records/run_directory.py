@@ -17,13 +17,13 @@ import msgspec
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
 from exneat_cli.records.locks import held
-from exneat_cli.records.manifest import DONE, Manifest, Result, read_manifest
+from exneat_cli.records.manifest import DONE, MANIFEST_FORMAT, Manifest, Result
+from exneat_cli.records.plain import read_json
 from exneat_cli.records.yaml_files import read_yaml
 
 _NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
-_MOST_NAMED = 3
 
 
 def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
@@ -114,11 +114,7 @@ class RunDirectory:
             yield is_finished
 
     def held(self) -> contextlib.AbstractContextManager[None]:
-        """Hold the directory against other processes.
-
-        Raises:
-            ExneatError: when entered, if another process holds it, or it cannot be opened.
-        """
+        """Hold the directory against other processes, see `locks.held`."""
         return held(self.path)
 
     def _may_be_used(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> bool:
@@ -153,9 +149,7 @@ class RunDirectory:
         here = _identity(configuration)
         keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
         named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
-        if len(named) > _MOST_NAMED:
-            named[_MOST_NAMED:] = ["..."]
-        return "; ".join(named) or "its manifest is of another one"
+        return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
 
     def begin(self, config: str, manifest: Manifest) -> None:
         """Write the first two files, the manifest first; if that fails, a directory that was new is gone again.
@@ -165,7 +159,7 @@ class RunDirectory:
         """
         is_new = not any(self.path.iterdir())
         try:
-            self.write_manifest(manifest)
+            write_json(self.manifest, manifest)
             write_whole(self.config, config)
         except ExneatError:
             if is_new:
@@ -196,8 +190,15 @@ class RunDirectory:
         return manifest.status == DONE and same
 
     def read_manifest(self) -> Manifest:
-        """See `records.manifest.read_manifest`."""
-        return read_manifest(self.manifest)
+        """The manifest.
+
+        Raises:
+            ExneatError: it is missing, damaged or of another format, or a finished run has no result.
+        """
+        manifest, _ = read_json(self.manifest, Manifest, MANIFEST_FORMAT)
+        if manifest.status == DONE and manifest.result is None:
+            raise ExneatError(f"{self.manifest}: damaged: result: expected the figures of a finished run, got nothing")
+        return manifest
 
     def read_result(self) -> Result:
         """The result of a finished run; see `read_manifest`."""
@@ -206,21 +207,13 @@ class RunDirectory:
             raise ExneatError(f"{self.path}: expected a finished run, got one without a result")
         return result
 
-    def write_manifest(self, manifest: Manifest) -> None:
-        """Replace the manifest.
-
-        Raises:
-            ExneatError: it cannot be written.
-        """
-        write_json(self.manifest, msgspec.to_builtins(manifest))
-
     def update_manifest(self, **changes: object) -> None:
         """Replace fields of the manifest.
 
         Raises:
             ExneatError: it cannot be read or written.
         """
-        self.write_manifest(msgspec.structs.replace(self.read_manifest(), **changes))
+        write_json(self.manifest, msgspec.structs.replace(self.read_manifest(), **changes))
 
 
 def find_runs(output: Path) -> list[RunDirectory]:

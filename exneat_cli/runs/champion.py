@@ -15,9 +15,9 @@ from exneat_cli.records import (
     RunDirectory,
     Scores,
     merge_robustness,
-    write_champion,
     write_csv,
     write_hall_of_fame,
+    write_json,
 )
 from exneat_cli.rollouts import Runner, Trace
 from exneat_cli.runs.progress import Progress
@@ -55,7 +55,7 @@ def choose_champion(training: Training, directory: RunDirectory, progress: Progr
         test=tested[0],
     )
     write_hall_of_fame(directory.hall_of_fame, candidates, [each.fitness_mean for each in validation])
-    write_champion(directory.champion, _champion(settings, champion.team, scores))
+    write_json(directory.champion, _champion(settings, champion.team, scores))
     _write_trace(settings, directory, trace)
     return Result(
         training=last["best_so_far"],

@@ -6,15 +6,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_whole
-from exneat_cli.records import RunDirectory, build, configuration_hash, section
+from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
+_Part = TypeVar("_Part")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -68,7 +69,7 @@ class RunSettings:
         if self.evolution is None:
             object.__setattr__(self, "evolution", RECURRENT if self.task.recurrent else EvolutionSettings())
         if isinstance(self.algorithm, str):
-            object.__setattr__(self, "algorithm", _algorithm({"name": self.algorithm}))
+            object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -141,15 +142,17 @@ class RunSettings:
         Raises:
             ConfigError: a key is unknown, or a value has the wrong type or range.
         """
-        task = section("task", plain.get("task", {}))
-        check_choice("task.name", task.get("name"), list(TASKS))
-        algorithm = _algorithm(section("algorithm", plain.get("algorithm", {"name": "exneat"})))
-        return build(cls, {**plain, "task": build(TASKS[task["name"]], task, "task."), "algorithm": algorithm})
+        task = _chosen(TASKS, "task", plain.get("task"))
+        algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
+        return build(cls, {**plain, "task": task, "algorithm": algorithm})
 
 
-def _algorithm(values: Mapping[str, Any]) -> Algorithm:
-    check_choice("algorithm", values.get("name"), list(ALGORITHMS))
-    return build(ALGORITHMS[values["name"]], values, "algorithm.")
+def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:
+    """One of several dataclasses, by the ``name`` in its section."""
+    if not isinstance(values, Mapping):
+        raise ConfigError(key, "a section with keys of its own", values)
+    check_choice(key, values.get("name"), list(registry))
+    return build(registry[values["name"]], values, f"{key}.")
 
 
 def executor_from(plain: object) -> Executor:
@@ -158,4 +161,4 @@ def executor_from(plain: object) -> Executor:
     Raises:
         ConfigError: a key is unknown, or a value has the wrong type or range.
     """
-    return build(Executor, section("executor", plain), "executor.")
+    return build(Executor, plain, "executor.")

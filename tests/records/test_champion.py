@@ -22,8 +22,8 @@ from exneat_cli.records import (
     Score,
     Scores,
     read_champion,
-    write_champion,
     write_hall_of_fame,
+    write_json,
 )
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
@@ -49,7 +49,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         genomes=tuple(map(Genome.of, team.genomes)),
     )
     path = tmp_path_factory.mktemp("sound") / "champion.json"
-    write_champion(path, champion)
+    write_json(path, champion)
     assert read_champion(path) == champion
     for genome, written in zip(champion.genomes, team.genomes, strict=True):
         assert np.array_equal(genome.in_arrays().nodes, written.nodes)
@@ -114,18 +114,15 @@ def test_whatever_is_changed_in_a_champion_it_is_refused_or_stays_within_its_mem
 ) -> None:
     content = copy.deepcopy(sound)
     for _ in range(data.draw(st.integers(1, 2))):
-        ways = list(places(content))
-        place = data.draw(st.sampled_from(ways))
-        kind = data.draw(st.sampled_from(["delete", "replace", "swap", "nudge"]))
+        ways = st.sampled_from(list(places(content)))
+        place = data.draw(ways)
+        kind = data.draw(st.sampled_from(["delete", "replace", "copy", "nudge"]))
         inside = holder(content, place)
         if kind == "delete":
             del inside[place[-1]]
-        elif kind == "swap":
-            other = data.draw(st.sampled_from(ways))
-            if other[: len(place)] == place or place[: len(other)] == other:
-                continue
-            there = holder(content, other)
-            inside[place[-1]], there[other[-1]] = there[other[-1]], inside[place[-1]]
+        elif kind == "copy":
+            other = data.draw(ways)
+            inside[place[-1]] = copy.deepcopy(holder(content, other)[other[-1]])
         elif kind == "nudge" and type(inside[place[-1]]) is int:
             inside[place[-1]] += data.draw(st.sampled_from([-2, -1, 1, 2, 100]))
         else:
@@ -153,23 +150,17 @@ DAMAGES: list[tuple[Place, Any, str]] = [
     (("format",), True, "expected format 2, got True"),
     (("feed_forward",), 1, "feed_forward: expected true or false, got 1"),
     (("variant",), "\x1b[31mred", r"variant: expected text .*, got '\\x1b\[31mred'"),
-    (("scores", "test", "fitness_mean"), None, "scores.test.fitness_mean: expected a number, got None"),
     (("plan", "observation_size"), 10**12, "plan.observation_size: expected a whole number from 1 to"),
-    (("plan", "observation_size"), 3, "reads what does not exist"),
     (("plan", "action_size"), 9, "plan.action_size: expected a whole number from 8 to 8"),
     (("plan", "modules"), [], "number of modules: expected a whole number from 1"),
-    (("plan", "modules", 0, "name"), "a\nb", r"plan\.modules\[0\]\.name: expected a word"),
-    (("plan", "modules", 0, "hidden"), 10**9, r"plan\.modules\[0\]\.hidden: expected"),
+    (("plan", "modules", 0, "name"), "a\nb", r"plan\.modules\[0\]\.name: expected text"),
     (("plan", "modules", 0, "outputs"), 10**12, r"plan\.modules\[0\]\.outputs: expected"),
-    (("plan", "modules", 0, "position"), [0], "position: expected a list of length 2"),
     (("plan", "modules", 0, "pins", -1, "module"), -2, r"pins\[\d+\]\.module: expected"),
     (("genomes",), [], "genomes: expected 3 of them"),
-    (("genomes", 0, "id"), -1, r"genomes\[0\]\.id: expected a whole number >= 0, got -1"),
     (("genomes", 0, "nodes", 0, "id"), 10**30, r"genomes\[0\]\.nodes\[0\]\.id: expected"),
     (("genomes", 0, "nodes", 0, "id"), 1, "expected nodes with different ids"),
     (("genomes", 0, "nodes", 0, "activation"), "swish", r"activation: expected .*\(tanh\|.*, got 'swish'"),
     (("genomes", 0, "connections", 0, "from"), -999, "from at most"),
-    (("genomes", 0, "connections", 0, "from"), 999, "does not exist"),
     (("genomes", 0, "connections", 0, "weight"), True, r"connections\[0\]\.weight: expected a number, got True"),
 ]
 
@@ -182,14 +173,12 @@ def test_a_field_that_makes_no_sense_is_named(
 ) -> None:
     content = copy.deepcopy(sound)
     holder(content, place)[place[-1]] = value
-    with pytest.raises(ExneatError, match=rf"champion\.json: .*({named})"):
+    with pytest.raises(ExneatError, match=rf"champion\.json: .*{named}"):
         read(tmp_path, content)
-
-
-def test_a_field_that_is_missing_is_named(sound: dict[str, Any], tmp_path: Path) -> None:
-    for field in set(sound) - {"format"}:
-        with pytest.raises(ExneatError, match=f"damaged: object missing required field {field}"):
-            read(tmp_path, {key: value for key, value in sound.items() if key != field})
+    del holder(content, place)[place[-1]]
+    if isinstance(place[-1], str) and place[-1] not in ("wurst", "format", "module", "index"):
+        with pytest.raises(ExneatError, match=rf"champion\.json: .*missing required field {place[-1]}"):
+            read(tmp_path, content)
 
 
 def test_a_feed_forward_champion_that_feeds_itself_is_refused(sound: dict[str, Any], tmp_path: Path) -> None:

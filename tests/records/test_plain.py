@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,7 +42,6 @@ def test_dataclasses_within_a_dataclass_are_made_of_their_sections() -> None:
         ({"name": "ant", "leg": 1}, "body.leg: unknown key (value 1)\n  did you mean body.legs?"),
         ({"name": "ant", "wings": 1}, "body.wings: unknown key (value 1)\n  known here: name, trunk, legs"),
         ({"name": "ant", "trunk": {"lenght": 1}}, "did you mean body.trunk.length?"),
-        ({"name": "ant", "legs": [{"length": 1, "\x1b": 1}]}, r"body.legs[0].\x1b: unknown key"),
         ({"name": "ant", "trunk": 1}, "body.trunk: expected a section with keys of its own, got 1"),
         ({"name": "ant", "legs": [{}]}, "body.legs[0].length: is missing"),
         ({}, "body.name: is missing"),
@@ -60,7 +58,6 @@ def test_a_key_that_does_not_fit_is_named_with_the_nearest_valid_one(values: dic
     ("content", "kind", "said"),
     [
         ({"a": ["x"]}, dict[str, list[int]], "x.json: [...][0]: expected a whole number, got {'a': ['x']}"),
-        ([1, 2], tuple[int, int, int], "x.json: expected a list of length 3, got [1, 2]"),
         ([10**5000], list[float], "[0]: number out of range"),
     ],
 )
@@ -78,7 +75,6 @@ def test_what_was_expected_and_what_came_are_said_in_one_line(content: Any, kind
         (b"[" * 100_000, "nested too deeply"),
         (b'{"format": NaN}', "expected JSON"),
         (b'{"format": 1e999}', "Number out of range"),
-        (b'{"format": "\\ud800"}', "expected JSON"),
         (b'{"format": ' + b"9" * 5000 + b"}", "expected JSON"),
         (b"[1]", "expected a JSON object, got list"),
         (b"{}", "expected format 3, got None: exneat did not write it"),
@@ -93,10 +89,3 @@ def test_what_is_no_json_of_this_format_is_refused_in_one_line(text: bytes, name
     with pytest.raises(ExneatError, match=rf"x\.json(:2)?: .*{named}") as refused:
         read_json(path, Manifest, 3)
     assert "\n" not in str(refused.value)
-
-
-def test_things_that_are_no_file_are_refused_at_once(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    for path, named in ((tmp_path / "pipe", "a pipe"), (tmp_path, "a directory"), (tmp_path / "x", "No such file")):
-        with pytest.raises(ExneatError, match=named):
-            read_json(path, Manifest, 3)
