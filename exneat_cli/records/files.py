@@ -65,7 +65,8 @@ def write_json(path: Path, content: object) -> None:
         ExneatError: the file cannot be written.
         ValueError: a number is not finite.
     """
-    write_whole(path, json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False) + "\n")
+    text = json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False, ensure_ascii=False)
+    write_whole(path, f"{text}\n".encode(errors="replace"))  # an argument of the command line may be no UTF-8
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

@@ -100,7 +100,7 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
         if key not in fields:
             close = difflib.get_close_matches(str(key), fields, n=1, cutoff=0.5)
             hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(fields)
-            raise ExneatError(f"{prefix}{shortened(key)[1:-1]}: unknown key (value {shortened(value)})\n  {hint}")
+            raise ExneatError(f"{prefix}{ascii(str(key))[1:-1][:60]}: unknown key (value {shortened(value)})\n  {hint}")
     for name, field in fields.items():
         if name not in values and field.default is field.default_factory is dataclasses.MISSING:
             raise ExneatError(f"{prefix}{name}: is missing")
@@ -111,6 +111,6 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
 def _made(hint: Any, value: Any, key: str) -> Any:
     if dataclasses.is_dataclass(hint) and not dataclasses.is_dataclass(value):
         return build(hint, value, f"{key}.")  # type: ignore[arg-type]
-    if get_origin(hint) is tuple and dataclasses.is_dataclass(get_args(hint)[0]):
+    if get_origin(hint) is tuple and dataclasses.is_dataclass(get_args(hint)[0]) and isinstance(value, list | tuple):
         return tuple(_made(get_args(hint)[0], each, f"{key}[{k}]") for k, each in enumerate(value))
     return value

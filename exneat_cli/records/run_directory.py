@@ -144,7 +144,7 @@ class RunDirectory:
         """What the run that is there has otherwise, in words."""
         try:
             there = _identity(read_yaml(self.config))
-        except ExneatError:
+        except (ExneatError, TypeError, ValueError):
             return "its config.yaml cannot be read"
         here = _identity(configuration)
         keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
