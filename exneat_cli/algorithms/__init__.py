@@ -16,7 +16,6 @@ from exneat_cli.algorithms.hall_of_fame import HallOfFame
 from exneat_cli.algorithms.neat.conversion import from_stock, to_stock
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.genome_data import genome_from_data, genome_to_data
 from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings, neat_config
 from exneat_cli.algorithms.teams import pack_teams, unpack_teams
 
@@ -49,8 +48,6 @@ __all__ = [
     "Team",
     "Trials",
     "from_stock",
-    "genome_from_data",
-    "genome_to_data",
     "neat_config",
     "pack_teams",
     "to_stock",

@@ -103,7 +103,7 @@ def _facts(study: Study) -> dict[str, Any]:
         rows.append((label, str(finished), str(len(seeds)), f"{min(seeds)} to {max(seeds)}" if seeds else ""))
     versions: dict[str, set[str]] = {}
     for manifest in study.manifests.values():
-        for library, version in manifest.get("versions", {}).items():
+        for library, version in manifest.versions.items():
             versions.setdefault(library, set()).add(str(version))
     conditions = study.results["condition"].unique()
     return {
