@@ -56,15 +56,15 @@ def generator(seed: SeedSequence) -> Generator:
     return Generator(PCG64(seed))
 
 
-def training_episodes(root: int, generation: int, count: int) -> list[EpisodeSeeds]:
-    """The `count` episodes that every team of one generation (counted from 0) faces."""
+def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
+    """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
     return [
         EpisodeSeeds(
             world=stream(root, "world", generation, episode),
             sensor_noise=stream(root, "sensor_noise", generation, episode),
             actions=stream(root, "action_ties", generation, episode),
         )
-        for episode in range(count)
+        for episode in range(first, first + count)
     ]
 
 

@@ -1,33 +1,58 @@
-"""Ask/tell over subpopulations: the only room that calls neat-python's evolution."""
+"""Algorithms behind one contract, `Algorithm`: one file (or folder) each, found by name in `ALGORITHMS`."""
 
-from exneat_cli.algorithms.exneat import PAIRINGS, Coevolution, Snapshot, Team
-from exneat_cli.algorithms.hall_of_fame import Entry, HallOfFame
+from exneat_cli.algorithms.algorithm import (
+    Algorithm,
+    Candidate,
+    Problem,
+    Results,
+    Search,
+    State,
+    Team,
+    Trials,
+)
+from exneat_cli.algorithms.baselines import BASELINES, Baseline
+from exneat_cli.algorithms.exneat import NEAT, PAIRINGS, Coevolution, ExNEAT
+from exneat_cli.algorithms.hall_of_fame import HallOfFame
 from exneat_cli.algorithms.neat.conversion import from_stock, to_stock
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
 from exneat_cli.algorithms.neat.genome_data import genome_from_data, genome_to_data
-from exneat_cli.algorithms.neat.packing import Columns, pack, unpack
 from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings, neat_config
-from exneat_cli.algorithms.neat.soundness import check_genome
+from exneat_cli.algorithms.teams import pack_teams, unpack_teams
+
+ALGORITHMS: dict[str, type[Algorithm]] = {
+    "exneat": ExNEAT,
+    "neat": NEAT,
+    **dict.fromkeys(BASELINES, Baseline),
+}
+"""Every algorithm by the name that it has in `conf/algorithm`."""
 
 __all__ = [
     "ACTIVATIONS",
+    "ALGORITHMS",
+    "BASELINES",
+    "NEAT",
     "PAIRINGS",
     "RECURRENT",
+    "Algorithm",
     "ArrayGenome",
+    "Baseline",
+    "Candidate",
     "Coevolution",
-    "Columns",
-    "Entry",
     "EvolutionSettings",
+    "ExNEAT",
     "HallOfFame",
-    "Snapshot",
+    "Problem",
+    "Results",
+    "Search",
+    "State",
     "Team",
-    "check_genome",
+    "Trials",
     "from_stock",
     "genome_from_data",
     "genome_to_data",
     "neat_config",
-    "pack",
+    "pack_teams",
     "to_stock",
-    "unpack",
+    "unpack_teams",
 ]

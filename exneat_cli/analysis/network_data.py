@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory, plan_from_data, read_champion_data
-from exneat_cli.wiring import Pin, Plan
+from exneat_cli.wiring import Plan
 
 Node = tuple[int, int]
 """A module, and a key in its genome: outputs from 0, then hidden nodes; input k is -1 - k."""
@@ -82,7 +82,7 @@ def champion_graph(content: dict[str, Any]) -> ChampionGraph:
     plan = plan_from_data(content["plan"])
     genomes = [content["genomes"][module.subpopulation] for module in plan.modules]
     nodes = [sorted(node["id"] for node in genome["nodes"]) for genome in genomes]
-    inputs = tuple(tuple(_read_by(plan, pin) for pin in module.pins) for module in plan.modules)
+    inputs = tuple(tuple((pin.module, pin.index) for pin in module.pins) for module in plan.modules)
     edges = tuple(
         tuple(Edge(gene["from"], gene["to"], gene["weight"]) for gene in genome["connections"] if gene["enabled"])
         for genome in genomes
@@ -109,11 +109,6 @@ def champion_graph(content: dict[str, Any]) -> ChampionGraph:
         used=frozenset(_reachable(sensing, steps) & _reachable(driving, back)),
         test_fitness=content["scores"]["test"]["fitness_mean"],
     )
-
-
-def _read_by(plan: Plan, pin: Pin) -> Node:
-    first = plan.modules[pin.module].outputs if pin.kind == "hidden" else 0
-    return pin.module, first + pin.index
 
 
 def _reachable(starts: set[Node], steps: Collection[tuple[Node, Node]]) -> set[Node]:

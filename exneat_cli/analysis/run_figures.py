@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.study import read_csv
-from exneat_cli.records import UNPERTURBED, HistoryRow, RobustnessRow, RunDirectory, read_robustness
+from exneat_cli.records import HISTORY_COLUMNS, UNPERTURBED, RobustnessRow, RunDirectory, read_robustness
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
@@ -28,7 +28,7 @@ _CURVES: dict[str, styles.Look] = {
 
 def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
     """Draw the fitness per generation in a run's history.csv, as PNG and SVG; `fitness_name` is its label."""
-    history = read_csv(run.history, HistoryRow._fields)
+    history = read_csv(run.history, HISTORY_COLUMNS)
     with styles.style():
         figure = Figure(figsize=(7.0, 4.2), layout="constrained")
         axes = figure.add_subplot()
@@ -79,8 +79,8 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
 def draw_path(run: RunDirectory) -> list[Path]:
     """Draw the agent at work in the first test episode, as PNG and SVG.
 
-    In a grid world: its path over the tiles and their cues, and the paths of prey. Elsewhere: its path over
-    the ground, coloured by time.
+    In a grid world: its path over the tiles and their cues, and the paths of prey. On the ground: its path,
+    coloured by time. Where a task tells no place: its reward terms over time.
     """
     trace = read_csv(run.trace)
     title = f"{run.path.name}: first test episode"
@@ -88,8 +88,10 @@ def draw_path(run: RunDirectory) -> list[Path]:
         if run.tiles.exists():
             figure = _on_tiles(trace, read_csv(run.tiles))
             figure.suptitle(title)
-        else:
+        elif {"x", "y"} <= set(trace.columns):
             figure = _on_ground(trace, title)
+        else:
+            figure = _over_time(trace, title)
     return styles.save_figure(figure, run.plots / "path")
 
 
@@ -102,6 +104,16 @@ def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
     axes.set(title=title, xlabel="x, ahead (m)", ylabel="y, left (m)")
     axes.set_aspect("equal", adjustable="datalim")
     figure.colorbar(points, ax=axes, label="control step")
+    axes.legend(loc="best")
+    return figure
+
+
+def _over_time(trace: pd.DataFrame, title: str) -> Figure:
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    for term in trace.columns.drop("step"):
+        axes.plot(trace["step"], trace[term], label=term.replace("_", " "))
+    axes.set(title=title, xlabel="control step", ylabel="reward of the step")
     axes.legend(loc="best")
     return figure
 

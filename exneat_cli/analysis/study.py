@@ -16,7 +16,7 @@ from typing import Any
 import pandas as pd
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HistoryRow, RobustnessRow, RunDirectory, read_robustness
+from exneat_cli.records import DONE, HISTORY_COLUMNS, RobustnessRow, RunDirectory, read_robustness
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
@@ -151,11 +151,11 @@ class Study:
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
         tables = [
-            read_csv(run.directory.history, HistoryRow._fields).assign(variant=run.variant, seed=run.seed)
+            read_csv(run.directory.history, HISTORY_COLUMNS).assign(variant=run.variant, seed=run.seed)
             for run in self.finished
             if run.condition == condition and run.variant not in self.baselines
         ]
-        nothing = pd.DataFrame(columns=[*HistoryRow._fields, "variant", "seed"], dtype=float)
+        nothing = pd.DataFrame(columns=[*HISTORY_COLUMNS, "variant", "seed"], dtype=float)
         return pd.concat(tables or [nothing], ignore_index=True)
 
     def robustness(self, condition: str) -> pd.DataFrame:

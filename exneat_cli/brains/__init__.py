@@ -2,6 +2,15 @@
 
 from exneat_cli.brains.assembly import assemble, assemble_all
 from exneat_cli.brains.brain import Brain, Brains
-from exneat_cli.brains.rules import RandomActions, linear_fusion, motionless
+from exneat_cli.brains.rules import RandomActions, acting_by_rule, linear_fusion, motionless
 
-__all__ = ["Brain", "Brains", "RandomActions", "assemble", "assemble_all", "linear_fusion", "motionless"]
+__all__ = [
+    "Brain",
+    "Brains",
+    "RandomActions",
+    "acting_by_rule",
+    "assemble",
+    "assemble_all",
+    "linear_fusion",
+    "motionless",
+]

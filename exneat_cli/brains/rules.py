@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains.brain import Brain
-from exneat_cli.tasks import Part
+from exneat_cli.tasks import Part, Task
 
 
 class RandomActions(NamedTuple):
@@ -18,6 +18,15 @@ class RandomActions(NamedTuple):
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+
+
+def acting_by_rule(rule: str, task: Task) -> Brain | RandomActions:
+    """Who acts in a task by the rule ``random``, ``motionless`` or ``linear_fusion``."""
+    if rule == "random":
+        return RandomActions(*task.action_bounds)
+    if rule == "motionless":
+        return motionless(task.sensed_size, task.resting_action)
+    return linear_fusion(task.sensed_size, len(task.actuator_names), task.parts)
 
 
 def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brain:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.wiring import Pin, Plan
+from exneat_cli.wiring import Plan
 
 
 class WiringArrays(NamedTuple):
@@ -22,7 +22,7 @@ class WiringArrays(NamedTuple):
         subpopulation: (M,) of each module.
         first_pin: (M + 1,) the pins of module m are first_pin[m] to first_pin[m + 1].
         pin_module: (P,) the module that is read; -1 for a sensor.
-        pin_index: (P,) which entry of the observation, or which of the module's outputs, then hidden nodes.
+        pin_index: (P,) which entry of what is sensed, or which node of the module.
         pin_delayed: (P,) whether the value of the previous step is read.
         driver: (A,) the module that sets each actuator; -1 for none.
         driver_output: (A,) which of its outputs.
@@ -57,13 +57,9 @@ def wiring_arrays(plan: Plan) -> WiringArrays:
         hidden_is_linked=np.array([linked[s] for s in range(len(linked))]),
         subpopulation=np.array([module.subpopulation for module in plan.modules], np.int64),
         first_pin=np.array([*itertools.accumulate((len(m.pins) for m in plan.modules), initial=0)], np.int64),
-        pin_module=np.array([pin.module if pin.kind != "sensor" else -1 for pin in pins], np.int64),
-        pin_index=np.array([_index(plan, pin) for pin in pins], np.int64),
+        pin_module=np.array([pin.module for pin in pins], np.int64),
+        pin_index=np.array([pin.index for pin in pins], np.int64),
         pin_delayed=np.array([pin.delayed for pin in pins], np.bool_),
         driver=driver,
         driver_output=driver_output,
     )
-
-
-def _index(plan: Plan, pin: Pin) -> int:
-    return pin.index + (plan.modules[pin.module].outputs if pin.kind == "hidden" else 0)

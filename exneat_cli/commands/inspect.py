@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from exneat_cli.algorithms import BASELINES
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import DONE, RUNNING, Champion, RunDirectory, find_runs, is_held, read_champion
-from exneat_cli.wiring import UNTRAINED, Module
+from exneat_cli.wiring import Module
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -35,7 +36,7 @@ def _show(run: RunDirectory) -> None:
         raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
     manifest = run.read_manifest()
     if not run.champion.exists():
-        why = "a baseline has no networks" if manifest.get("variant") in UNTRAINED else "it is not finished"
+        why = "a baseline has no networks" if manifest.get("variant") in BASELINES else "it is not finished"
         raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
     champion = read_champion(run.champion)
     print(f"{run.path}  ({_status(run, manifest)})")
@@ -69,8 +70,8 @@ def _show_module(champion: Champion, module: Module) -> None:
 def _links(champion: Champion, module: Module) -> Iterable[str]:
     groups: dict[tuple[int, str, bool], list[int]] = {}
     for pin in module.pins:
-        if pin.kind != "sensor":
-            groups.setdefault((pin.module, pin.kind, pin.delayed), []).append(pin.index)
+        if not pin.is_sensor:
+            groups.setdefault((pin.module, champion.plan.kind_of(pin), pin.delayed), []).append(pin.index)
     for (source, kind, delayed), indices in groups.items():
         when = "of the previous step" if delayed else "of this step"
         yield f"{kind} {_ranges(indices)} of {champion.plan.modules[source].name}, {when}"

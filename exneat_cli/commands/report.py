@@ -23,7 +23,7 @@ from exneat_cli.commands.experiments import (
 )
 from exneat_cli.errors import ExneatError, check_choice
 from exneat_cli.records import DONE, RunDirectory
-from exneat_cli.wiring import UNTRAINED
+from exneat_cli.tasks import HasFullReward
 
 
 @dataclass(frozen=True)
@@ -153,9 +153,9 @@ def _study(experiment: Experiment, request: Request) -> Study:
         claim=experiment.claim,
         command=" ".join(["exneat sweep", f"experiment={name}", f"budget={budget}", *extra, *request.overrides]),
         fitness_name=task.fitness_name,
-        has_full_reward=task.has_full_reward,
+        has_full_reward=isinstance(task, HasFullReward),
         variants={name: variant.label for name, variant in experiment.variants.items()},
-        baselines=tuple(dict.fromkeys(job.variant for job in jobs if job.settings.algorithm in UNTRAINED)),
+        baselines=tuple(dict.fromkeys(job.variant for job in jobs if job.settings.algorithm.rule)),
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps=labels,
         runs=tuple(_planned(job) for job in jobs),

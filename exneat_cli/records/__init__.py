@@ -5,7 +5,7 @@ from exneat_cli.records.champion import Champion, read_champion, write_champion,
 from exneat_cli.records.champion_data import plan_from_data, read_champion_data
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, read_json, write_csv, write_json, write_whole
-from exneat_cli.records.history import HistoryRow, write_history
+from exneat_cli.records.history import HISTORY_COLUMNS, HistoryRow, write_history
 from exneat_cli.records.locks import is_held
 from exneat_cli.records.manifest_data import DONE, FAILED, INTERRUPTED, RUNNING
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
@@ -21,6 +21,7 @@ from exneat_cli.records.yaml_files import check_yaml, read_yaml
 __all__ = [
     "DONE",
     "FAILED",
+    "HISTORY_COLUMNS",
     "INTERRUPTED",
     "MANIFEST_FORMAT",
     "RUNNING",

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from exneat_cli.algorithms import ArrayGenome, Entry, genome_from_data, genome_to_data
+from exneat_cli.algorithms import ArrayGenome, Candidate, genome_from_data, genome_to_data
 from exneat_cli.brains import Brain, assemble
 from exneat_cli.records.champion_data import FORMAT, plan_from_data, read_champion_data
 from exneat_cli.records.files import write_json, write_whole
@@ -79,7 +79,7 @@ def read_champion(path: Path) -> Champion:
     )
 
 
-def write_hall_of_fame(path: Path, entries: Sequence[Entry], validation: Sequence[float]) -> None:
+def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[float]) -> None:
     """Write one line per team, best on validation first.
 
     Args:

@@ -11,7 +11,7 @@ from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag
 from exneat_cli.records.files import read_json
 from exneat_cli.wiring import Module, Pin, Plan
 
-FORMAT = 1
+FORMAT = 2
 _LARGEST = 1_000_000
 _LARGEST_ID = 2**62
 _FIELDS = ("format", "variant", "task", "actuators", "feed_forward", "scores", "plan", "genomes")
@@ -154,12 +154,10 @@ def _check_plan(plan: object) -> None:
 
 
 def _check_pin(key: str, pin: object) -> None:
-    _check_fields(key, pin, ("kind", "index", "module", "delayed"))
+    _check_fields(key, pin, ("index", "module", "delayed"))
     assert isinstance(pin, dict)
-    check_choice(f"{key}.kind", pin["kind"], ("sensor", "output", "hidden"))
     check_whole(f"{key}.index", pin["index"], 0, _LARGEST)
-    own = pin["kind"] == "sensor"
-    check_whole(f"{key}.module", pin["module"], -1 if own else 0, -1 if own else _LARGEST)
+    check_whole(f"{key}.module", pin["module"], -1, _LARGEST)
     check_flag(f"{key}.delayed", pin["delayed"])
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, read_bytes, write_whole
 
-FORMAT = 1
+FORMAT = 2
 KEPT = 2
 """The newest one, and one to fall back to."""
 _LARGEST = 16 * 1024**3

@@ -4,47 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from exneat_cli.records.files import write_csv
 
+HistoryRow = dict[str, int | float]
+"""The figures of one generation, by column; see `COLUMNS`. An algorithm may add columns of its own."""
 
-class HistoryRow(NamedTuple):
-    """One generation, counted from 1.
+COLUMNS = {
+    "generation": "counted from 1",
+    "best_fitness": "of the generation's teams that did not fail",
+    "mean_fitness": "over the generation's teams",
+    "median_fitness": "over the generation's teams",
+    "best_so_far": "running maximum of best_fitness",
+    "episodes": "training episodes since the run began",
+    "env_steps": "training control steps since the run began",
+    "species": "of ExNEAT and NEAT: sum over subpopulations",
+    "connections": "enabled connections of the best team, each genome once",
+    "hidden_nodes": "nodes of the best team that are not outputs, each genome once",
+    "failed_episodes": "of this generation",
+    "extinctions": "of ExNEAT and NEAT: subpopulations that were created anew for this generation",
+    "wall_seconds": "since training began; the only column that differs between equal runs",
+}
+"""Every column that exneat itself knows, in the order of the file, and what it holds."""
 
-    Attributes:
-        generation: counted from 1.
-        best_fitness, mean_fitness, median_fitness: over the generation's teams; the best of those that
-            did not fail.
-        best_so_far: running maximum of `best_fitness`.
-        episodes, env_steps: training episodes and control steps since the run began.
-        species: sum over subpopulations.
-        connections, hidden_nodes: of the best team, each genome once; enabled connections, nodes that
-            are not outputs.
-        failed_episodes: of this generation.
-        extinctions: subpopulations that were created anew for this generation.
-        wall_seconds: time since training began; the only column that differs between equal runs.
-    """
-
-    generation: int
-    best_fitness: float
-    mean_fitness: float
-    median_fitness: float
-    best_so_far: float
-    episodes: int
-    env_steps: int
-    species: int
-    connections: int
-    hidden_nodes: int
-    failed_episodes: int
-    extinctions: int
-    wall_seconds: float
+HISTORY_COLUMNS = tuple(name for name in COLUMNS if name not in ("species", "extinctions"))
+"""The columns that every history has."""
 
 
 def write_history(path: Path, rows: Sequence[HistoryRow]) -> None:
-    """Write all rows so far.
+    """Write all rows so far; columns that are not in `COLUMNS` come before the last.
 
     Raises:
         ExneatError: the file cannot be written.
     """
-    write_csv(path, HistoryRow._fields, rows)
+    *known, last = (name for name in COLUMNS if name in rows[0])
+    columns = [*known, *(name for name in rows[0] if name not in COLUMNS), last]
+    write_csv(path, columns, [[row[name] for name in columns] for row in rows])

@@ -18,7 +18,7 @@ from exneat_cli.records.locks import held
 from exneat_cli.records.manifest_data import DONE, read_manifest_data, result_of
 from exneat_cli.records.yaml_files import read_yaml
 
-MANIFEST_FORMAT = 2
+MANIFEST_FORMAT = 3
 
 _WITHOUT_EFFECT = ("executor", "output", "name", "resume", "checkpoint_every")
 """Settings that say where and how to run, not what comes out."""

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks import FAILED, Task
+from exneat_cli.tasks import FAILED, HasFullReward, Task
+from exneat_cli.wiring import Moments
 
 
 class Outcomes(NamedTuple):
@@ -18,12 +19,14 @@ class Outcomes(NamedTuple):
         full_reward: (B, E) the task's second figure; the failure floor likewise.
         steps: (B, E) control steps done.
         failed: (B, E) whether physics or network exploded.
+        moments: (B, sensed) of what each brain sensed in its episodes, if it was asked for.
     """
 
     fitness: NDArray[np.float64]
     full_reward: NDArray[np.float64]
     steps: NDArray[np.int64]
     failed: NDArray[np.bool_]
+    moments: Moments | None = None
 
 
 class Trace(NamedTuple):
@@ -65,7 +68,8 @@ class Results(NamedTuple):
     def outcomes(self, task: Task) -> Outcomes:
         """What they mean in a task."""
         with np.errstate(invalid="ignore"):
-            fitness, full_reward = task.fitness_of(self.totals).T, task.full_reward_of(self.totals).T
+            fitness = task.fitness_of(self.totals).T
+            full_reward = task.full_reward_of(self.totals).T if isinstance(task, HasFullReward) else fitness
         failed = (self.status.T == FAILED) | ~np.isfinite(fitness) | ~np.isfinite(full_reward)
         floor = task.failure_floor
         return Outcomes(np.where(failed, floor, fitness), np.where(failed, floor, full_reward), self.steps.T, failed)

@@ -14,7 +14,7 @@ from exneat_cli.rollouts.episode import Buffers, Conditions, episode_loop
 from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Results
 from exneat_cli.seeding import EpisodeSeeds, generator
-from exneat_cli.tasks import Task
+from exneat_cli.tasks import HasInitialPose, HasTiles, Simulation, Task
 
 
 class Crew(NamedTuple):
@@ -48,7 +48,7 @@ class Player:
 
     def __init__(self, setup: Setup, halt: NDArray[np.bool_] | None = None) -> None:
         self._task = setup.task
-        self._simulation = setup.task.open(training=setup.training, reset_scale=setup.noise.reset_scale)
+        self._simulation = open_world(setup.task, setup.noise, training=setup.training)
         self._loop = episode_loop(self._simulation, setup.task.name)
         self._halt = np.zeros(1, dtype=np.bool_) if halt is None else halt
         self.compiled = self._simulation.compiled
@@ -103,5 +103,12 @@ class Player:
             )
 
     def tiles(self) -> NDArray[np.float64] | None:
-        """The world as the last episode left it, see `Task.tiles`."""
-        return self._task.tiles(self._simulation.world)
+        """The world as the last episode left it, see `HasTiles`; None where there are no tiles."""
+        return self._task.tiles(self._simulation.world) if isinstance(self._task, HasTiles) else None
+
+
+def open_world(task: Task, noise: Noise, *, training: bool) -> Simulation:
+    """Open a new world, with the noise on its initial pose if it has one."""
+    if isinstance(task, HasInitialPose):
+        return task.open_disturbed(training=training, reset_scale=noise.reset_scale)
+    return task.open(training=training)

@@ -16,7 +16,7 @@ from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Outcomes
 from exneat_cli.rollouts.runner import Runner
 from exneat_cli.seeding import EpisodeSeeds
-from exneat_cli.tasks import Task
+from exneat_cli.tasks import HasInitialPose, Task
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def perturbed(task: Task, noise: Noise, sweep: Sweep, level: float) -> tuple[Tas
     part = {"task": task, "noise": noise}.get(section)
     if part is None or name not in {field.name for field in dataclasses.fields(part)}:  # type: ignore[arg-type]
         raise ConfigError("sweep", f"a sweep that fits task={task.name}", sweep.name, f"it has no {sweep.parameter}")
-    if sweep.parameter == "noise.reset_scale" and not task.has_initial_pose:
+    if sweep.parameter == "noise.reset_scale" and not isinstance(task, HasInitialPose):
         raise ConfigError("sweep", f"a sweep that fits task={task.name}", sweep.name, "it has no initial pose")
     changed = dataclasses.replace(part, **{name: level})  # type: ignore[type-var]
     return (changed, noise) if section == "task" else (task, changed)  # type: ignore[return-value]

@@ -55,7 +55,13 @@ class Runner:
     def __exit__(self, *exception: object) -> None:
         self._work.close()
 
-    def run(self, brains: Brains | Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
+    def run(
+        self,
+        brains: Brains | Sequence[Brain] | RandomActions,
+        episodes: Sequence[EpisodeSeeds],
+        *,
+        moments: bool = False,
+    ) -> Outcomes:
         """Outcomes of every brain (one, if it acts at random) in every episode.
 
         Raises:

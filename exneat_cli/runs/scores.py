@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions, linear_fusion, motionless
+from exneat_cli.brains import Brain
 from exneat_cli.records import RobustnessRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
@@ -40,12 +40,11 @@ class Score:
 
 def score_all(outcomes: Outcomes) -> list[Score]:
     """Summary of each brain's episodes."""
-    return [_score(*(values[k] for values in outcomes)) for k in range(len(outcomes.fitness))]
+    columns = (outcomes.fitness, outcomes.full_reward, outcomes.failed)
+    return [_score(*(values[k] for values in columns)) for k in range(len(outcomes.fitness))]
 
 
-def _score(
-    fitness: NDArray[np.float64], full_reward: NDArray[np.float64], steps: NDArray[np.int64], failed: NDArray[np.bool_]
-) -> Score:
+def _score(fitness: NDArray[np.float64], full_reward: NDArray[np.float64], failed: NDArray[np.bool_]) -> Score:
     return Score(
         episodes=len(fitness),
         fitness_mean=float(fitness.mean()),
@@ -62,19 +61,10 @@ def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes
     return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
 
 
-def baseline(task: Task, algorithm: str) -> list[Brain] | RandomActions:
-    """What `Runner.run` needs for ``random``, ``motionless`` or ``linear_fusion``."""
-    if algorithm == "random":
-        return RandomActions(*task.action_bounds)
-    if algorithm == "motionless":
-        return [motionless(task.observation_size, task.resting_action)]
-    return [linear_fusion(task.observation_size, len(task.actuator_names), task.parts)]
-
-
 def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     """The test episodes, equal for all runs and variants; random actions are drawn from the run's own stream."""
     tests = shared_episodes("test", episodes)
-    if settings.algorithm != "random":
+    if settings.algorithm.rule != "random":
         return tests
     root = settings.seed
     return [each._replace(actions=stream(root, "random_actions", k)) for k, each in enumerate(tests)]

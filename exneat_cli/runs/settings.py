@@ -10,12 +10,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from exneat_cli.algorithms import PAIRINGS, RECURRENT, EvolutionSettings
+from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole, shortened
 from exneat_cli.records import RunDirectory, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
-from exneat_cli.tasks import TASKS, AntTask, Task
-from exneat_cli.wiring import CENTRAL, UNTRAINED, Geometry, Plan, Wiring, plan_wiring
+from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
+from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _Part = TypeVar("_Part")
@@ -27,8 +27,7 @@ class RunSettings:
 
     Attributes:
         task: what is learned.
-        algorithm: ``exneat``, ``neat``, or an untrained baseline: ``random``, ``motionless`` or
-            ``linear_fusion``.
+        algorithm: settings of the algorithm, or its name in `ALGORITHMS` for its defaults.
         geometry, linkage, wiring: how modules are wired.
         noise: what disturbs the agent, in training, validation and test alike.
         evolution: how genomes change and compete; left out, what suits the task's kind of network.
@@ -49,7 +48,7 @@ class RunSettings:
     """
 
     task: Task = field(default_factory=AntTask)
-    algorithm: str = "exneat"
+    algorithm: Algorithm = field(default_factory=ExNEAT)
     geometry: Geometry = field(default_factory=Geometry)
     linkage: str = "none"
     wiring: Wiring = field(default_factory=Wiring)
@@ -70,7 +69,9 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         if self.evolution is None:
-            object.__setattr__(self, "evolution", RECURRENT if self.task.needs_memory else EvolutionSettings())
+            object.__setattr__(self, "evolution", RECURRENT if self.task.recurrent else EvolutionSettings())
+        if isinstance(self.algorithm, str):
+            object.__setattr__(self, "algorithm", _algorithm({"name": self.algorithm}))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -85,7 +86,7 @@ class RunSettings:
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
-        if not self.task.has_initial_pose and self.noise.reset_scale != Noise().reset_scale:
+        if not isinstance(self.task, HasInitialPose) and self.noise.reset_scale != Noise().reset_scale:
             fix = f"task={self.task.name} has no initial pose that noise could disturb"
             raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, fix)
         _ = self.plan
@@ -93,23 +94,22 @@ class RunSettings:
     @property
     def plan(self) -> Plan:
         """Who senses and drives what."""
-        hidden = self.evolution.neat_hidden if self.algorithm == "neat" else self.evolution.module_hidden
-        return plan_wiring(self.task, self.algorithm, self.geometry, self.linkage, self.wiring, hidden=hidden)
+        return self.algorithm.plan(self.task, self.geometry, self.linkage, self.wiring, self.evolution)
 
     @property
     def variant(self) -> str:
         """What is compared, in one word, e.g. ``exneat-all-none`` or ``neat``."""
-        if self.algorithm != "exneat":
-            return self.algorithm
+        if not self.algorithm.modular:
+            return self.algorithm.name
         vector = self.geometry.subpopulations(self.task.parts) if self.geometry.vector else ()
         geometry = self.geometry.name + "".join(str(entry) for entry in vector)
         decentral = self.task.trunk is not None and self.wiring.central is False
-        return f"exneat-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
+        return f"{self.algorithm.name}-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
 
     @property
     def trained_generations(self) -> int:
         """Generations of training; 0 for a baseline, which nothing trains."""
-        return 0 if self.algorithm in UNTRAINED else self.generations
+        return 0 if self.algorithm.rule else self.generations
 
     @property
     def directory(self) -> RunDirectory:
@@ -155,10 +155,16 @@ class RunSettings:
         check_choice("task.name", task.get("name"), list(TASKS))
         values: dict[str, Any] = dict(plain)
         values["task"] = _build(TASKS[task["name"]], task, "task.")
+        values["algorithm"] = _algorithm(_section("algorithm", plain.get("algorithm", {"name": "exneat"})))
         for key, part in parts.items():
             if key in values:
                 values[key] = _build(part, _section(key, values[key]), f"{key}.")
         return _build(cls, values, "")
+
+
+def _algorithm(values: Mapping[str, Any]) -> Algorithm:
+    check_choice("algorithm", values.get("name"), list(ALGORITHMS))
+    return _build(ALGORITHMS[values["name"]], values, "algorithm.")
 
 
 def executor_from(plain: object) -> Executor:

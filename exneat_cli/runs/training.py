@@ -4,190 +4,180 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from exneat_cli.algorithms import Coevolution, Entry, HallOfFame, Team, check_genome, neat_config
+from exneat_cli.algorithms import (
+    Problem,
+    Results,
+    Search,
+    State,
+    Team,
+    pack_teams,
+    unpack_teams,
+)
 from exneat_cli.brains import assemble_all
-from exneat_cli.errors import ExneatError
 from exneat_cli.records import Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
-from exneat_cli.runs.saved_training import SavedTraining
 from exneat_cli.runs.settings import RunSettings
-from exneat_cli.seeding import stream, training_episodes
+from exneat_cli.seeding import training_episodes
+from exneat_cli.wiring import pooled_by_pin
+
+_FIRST = "first_generation"
 
 
-@dataclass(frozen=True)
-class Trained:
-    """What training leaves behind.
+class _Turn(NamedTuple):
+    """Teams of one `ask`, what came out of their episodes, and what the algorithm was told."""
+
+    teams: Sequence[Team]
+    outcomes: Outcomes
+    results: Results
+
+
+@dataclass
+class Training:
+    """A training between two generations; `advance` does the next one.
 
     Attributes:
-        hall_of_fame: best first; never empty.
-        first_generation: the best team of the first generation, which is random.
-        history: one row per generation.
-    """
-
-    hall_of_fame: list[Entry]
-    first_generation: Team
-    history: list[HistoryRow]
-
-
-def evolve(
-    settings: RunSettings,
-    runner: Runner,
-    report: Callable[[list[HistoryRow]], None],
-    *,
-    checkpoints: Iterable[Checkpoint | str] = (),
-    say: Callable[[str], None] = lambda _: None,
-    save: Callable[[Checkpoint], None] | None = None,
-) -> Trained:
-    """Train one variant.
-
-    Args:
         settings: of the run.
-        runner: runs training episodes.
-        report: called with all rows so far after each generation.
-        checkpoints: the newest first, with a line in place of each that cannot be read; training goes on from the
-            first one that is sound, else from the beginning, with the same results.
-        say: told what it goes on from.
-        save: called with a checkpoint every `settings.checkpoint_every` generations, and after the last.
-
-    Raises:
-        ExneatError: not a single team ever finished its episodes.
+        search: the algorithm at work.
+        history: one row per generation that is done.
+        first_generation: the best team of the first generation, which is random; None before it.
+        began: clock time (s) at which an undisturbed training would have begun.
     """
-    training = _begin_or_go_on(settings, runner, checkpoints, say)
-    while (done := len(training.history)) < settings.generations:
-        training.advance()
-        report(training.history)
-        if save is not None and ((done + 1) % settings.checkpoint_every == 0 or done + 1 == settings.generations):
-            save(training.checkpoint())
-    if not training.hall_of_fame.entries:
-        raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
-    assert training.first_generation is not None
-    return Trained(training.hall_of_fame.entries, training.first_generation, training.history)
 
-
-def _begin_or_go_on(
-    settings: RunSettings, runner: Runner, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
-) -> _Training:
-    for checkpoint in checkpoints:
-        if isinstance(checkpoint, str):
-            say(checkpoint)
-            continue
-        try:
-            training = _Training.restored(settings, runner, checkpoint)
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
-        else:
-            say(f"going on after generation {checkpoint.generation}")
-            return training
-    return _Training(settings, runner)
-
-
-def _failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
-    """The fitness that evolution is told: failed teams rank behind sound ones, also behind those below the floor."""
-    if not sound:
-        return list(fitness)
-    behind = math.nextafter(min(fitness[k] for k in sound), -math.inf)
-    passed = set(sound)
-    return [value if k in passed else min(value, behind) for k, value in enumerate(fitness)]
-
-
-def _configs(settings: RunSettings) -> list[Any]:
-    shapes = settings.plan.subpopulation_shapes
-    return [neat_config(settings.evolution, settings.population, shape) for shape in shapes]
-
-
-class _Training:
-    """The state that a generation hands to the next."""
-
-    def __init__(self, settings: RunSettings, runner: Runner) -> None:
-        self._settings = settings
-        self._runner = runner
-        self._plan = settings.plan
-        configs = _configs(settings)
-        self._coevolution = Coevolution(
-            configs,
-            [stream(settings.seed, "evolution", index) for index in range(len(configs))],
-            stream(settings.seed, "pairing"),
-            settings.pairing,
-        )
-        self._began = time.perf_counter()
-        self.hall_of_fame = HallOfFame()
-        self.history: list[HistoryRow] = []
-        self.first_generation: Team | None = None
+    settings: RunSettings
+    search: Search
+    history: list[HistoryRow] = field(default_factory=list)
+    first_generation: Team | None = None
+    began: float = field(default_factory=time.perf_counter)
 
     @classmethod
-    def restored(cls, settings: RunSettings, runner: Runner, checkpoint: Checkpoint) -> _Training:
-        """The training that `checkpoint` was taken of, or one that goes on just as it would have."""
-        configs = _configs(settings)
-        saved = SavedTraining.read(checkpoint, len(configs))
-        if not 1 <= len(saved.history) == checkpoint.generation <= settings.generations:
-            raise ValueError(f"expected at most {settings.generations} generations, got {len(saved.history)}")
-        for team in (saved.first_generation, *(entry.team for entry in saved.hall_of_fame)):
-            for genome, (inputs, _, outputs) in zip(team.genomes, settings.plan.subpopulation_shapes, strict=True):
-                check_genome(genome, inputs, outputs, feed_forward=settings.evolution.feed_forward)
-        training = cls.__new__(cls)
-        training._settings, training._runner, training._plan = settings, runner, settings.plan
-        training._coevolution = Coevolution.restored(configs, saved.coevolution, settings.pairing)
-        training.hall_of_fame = HallOfFame(saved.hall_of_fame)
-        training.history = saved.history
-        training.first_generation = saved.first_generation
-        training._began = time.perf_counter() - saved.history[-1].wall_seconds
-        return training
+    def start(cls, settings: RunSettings) -> Training:
+        """Begin with the first generation."""
+        return cls(settings, settings.algorithm.start(_problem(settings)))
 
-    def checkpoint(self) -> Checkpoint:
-        """What `restored` needs; taking it changes nothing."""
-        assert self.first_generation is not None
-        saved = SavedTraining(
-            self._coevolution.snapshot(), self.hall_of_fame.entries, self.first_generation, self.history
-        )
-        return saved.as_checkpoint()
+    @classmethod
+    def restored(cls, settings: RunSettings, checkpoint: Checkpoint) -> Training:
+        """The training that `checkpoint` was taken of, or one that goes on just as it would have.
 
-    def advance(self) -> None:
-        """Evaluate and record one generation."""
-        generation = len(self.history)
-        teams = self._coevolution.ask()
-        outcomes = self._evaluate(teams, generation)
-        failed = outcomes.failed.any(axis=1)
-        means = outcomes.fitness.mean(axis=1)
-        fitness = np.where(failed, self._settings.task.failure_floor, means).tolist()
-        sound = np.flatnonzero(~failed).tolist()
-        self._coevolution.tell(_failed_last(fitness, sound))
-        for k in sound:
-            self.hall_of_fame.add(teams[k], fitness[k], generation)
+        Raises:
+            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is damaged, or of other settings.
+        """
+        problem = _problem(settings)
+        history = [_sound(number, row) for number, row in enumerate(checkpoint.plain["history"], start=1)]
+        if not 1 <= len(history) == checkpoint.generation <= settings.generations:
+            raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
+        (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
+        search = settings.algorithm.restored(problem, State(checkpoint.plain["search"], checkpoint.arrays))
+        return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
+
+    @classmethod
+    def resumed(
+        cls, settings: RunSettings, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
+    ) -> Training:
+        """Go on from the first checkpoint that is sound, else begin; the results are the same.
+
+        Args:
+            settings: of the run.
+            checkpoints: the newest first, with a line in place of each that cannot be read.
+            say: told what it goes on from.
+        """
+        for checkpoint in checkpoints:
+            if isinstance(checkpoint, str):
+                say(checkpoint)
+                continue
+            try:
+                training = cls.restored(settings, checkpoint)
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+                say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
+            else:
+                say(f"going on after generation {checkpoint.generation}")
+                return training
+        return cls.start(settings)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all generations are done."""
+        return len(self.history) >= self.settings.generations
+
+    def advance(self, runner: Runner) -> None:
+        """Evaluate one generation, in as many turns as the algorithm wants, and record it."""
+        settings, turns, over = self.settings, list[_Turn](), False
+        while not over:
+            trials = self.search.ask()
+            genomes = [team.genomes for team in trials.teams]
+            brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
+            done = sum(turn.outcomes.steps.shape[1] for turn in turns)
+            episodes = training_episodes(settings.seed, len(self.history), trials.episodes, first=done)
+            outcomes = runner.run(brains, episodes, moments=settings.algorithm.wants_moments)
+            turns.append(_Turn(trials.teams, outcomes, _results(settings, outcomes)))
+            over = self.search.tell(turns[-1].results)
+        self._record(turns)
+
+    def _record(self, turns: Sequence[_Turn]) -> None:
+        before = self.history[-1] if self.history else None
+        teams = [team for turn in turns for team in turn.teams]
+        fitness = [value for turn in turns for value in turn.results.fitness.mean(axis=1).tolist()]
+        sound = np.flatnonzero(~np.concatenate([turn.results.failed for turn in turns])).tolist()
         best = max(sound or range(len(teams)), key=lambda k: fitness[k])
         if self.first_generation is None:
             self.first_generation = teams[best]
-        self._record(teams[best], fitness, fitness[best], outcomes)
-
-    def _evaluate(self, teams: Sequence[Team], generation: int) -> Outcomes:
-        settings = self._settings
-        seeds = training_episodes(settings.seed, generation, settings.episodes)
-        genomes = [team.genomes for team in teams]
-        brains = assemble_all(self._plan, genomes, feed_forward=settings.evolution.feed_forward)
-        return self._runner.run(brains, seeds)
-
-    def _record(self, best_team: Team, fitness: Sequence[float], best_fitness: float, outcomes: Outcomes) -> None:
-        before = self.history[-1] if self.history else None
-        genomes = list(zip(best_team.genomes, self._plan.subpopulation_shapes, strict=True))
+        shapes = self.settings.plan.subpopulation_shapes
+        sizes = [genome.size() for genome in teams[best].genomes]
+        outcomes = [turn.outcomes for turn in turns]
         self.history.append(
-            HistoryRow(
-                generation=len(self.history) + 1,
-                best_fitness=best_fitness,
-                mean_fitness=float(np.mean(fitness)),
-                median_fitness=float(np.median(fitness)),
-                best_so_far=max(best_fitness, before.best_so_far) if before else best_fitness,
-                episodes=outcomes.steps.size + (before.episodes if before else 0),
-                env_steps=int(outcomes.steps.sum()) + (before.env_steps if before else 0),
-                species=self._coevolution.species_count,
-                connections=sum(genome.size()[1] for genome, _ in genomes),
-                hidden_nodes=sum(genome.size()[0] - outputs for genome, (_, _, outputs) in genomes),
-                failed_episodes=int(outcomes.failed.sum()),
-                extinctions=self._coevolution.extinctions,
-                wall_seconds=round(time.perf_counter() - self._began, 3),
-            )
+            {
+                "generation": len(self.history) + 1,
+                "best_fitness": fitness[best],
+                "mean_fitness": float(np.mean(fitness)),
+                "median_fitness": float(np.median(fitness)),
+                "best_so_far": max(fitness[best], before["best_so_far"]) if before else fitness[best],
+                "episodes": sum(each.steps.size for each in outcomes) + (before["episodes"] if before else 0),
+                "env_steps": sum(int(each.steps.sum()) for each in outcomes) + (before["env_steps"] if before else 0),
+                "connections": sum(connections for _, connections in sizes),
+                "hidden_nodes": sum(n - outputs for (n, _), (_, _, outputs) in zip(sizes, shapes, strict=True)),
+                "failed_episodes": sum(int(each.failed.sum()) for each in outcomes),
+                **self.search.columns(),
+                "wall_seconds": round(time.perf_counter() - self.began, 3),
+            }
         )
+
+    def checkpoint(self) -> Checkpoint:
+        """All that the rest of the training depends on; taking it changes nothing."""
+        assert self.first_generation is not None
+        state = self.search.state()
+        plain = {"search": state.plain, "history": self.history}
+        arrays = {**state.arrays, **pack_teams([self.first_generation], _FIRST)}
+        return Checkpoint(len(self.history), plain, arrays)
+
+
+def _problem(settings: RunSettings) -> Problem:
+    return Problem(
+        plan=settings.plan,
+        evolution=settings.evolution,
+        population=settings.population,
+        episodes=settings.episodes,
+        pairing=settings.pairing,
+        seed=settings.seed,
+    )
+
+
+def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
+    """A row of a checkpoint, which must be that of generation `number`."""
+    finite = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
+    if not finite or row["generation"] != number:
+        raise ValueError(f"expected the figures of generation {number}, got {row}")
+    return dict(row)
+
+
+def _results(settings: RunSettings, outcomes: Outcomes) -> Results:
+    """What the algorithm is told; a team that failed once has the failure floor in all of its episodes."""
+    failed: NDArray[np.bool_] = np.any(outcomes.failed, axis=1)
+    outcomes.fitness[failed] = settings.task.failure_floor
+    sensed = () if outcomes.moments is None else pooled_by_pin(settings.plan, outcomes.moments)
+    return Results(outcomes.fitness, failed, sensed)

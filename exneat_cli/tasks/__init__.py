@@ -9,7 +9,17 @@ from exneat_cli.tasks.grid.environment import WORLDS
 from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.robots.ant import AntTask
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task
+from exneat_cli.tasks.task import (
+    ENDED,
+    FAILED,
+    RUNNING,
+    HasFullReward,
+    HasInitialPose,
+    HasTiles,
+    Part,
+    Simulation,
+    Task,
+)
 
 TASKS: dict[str, type[Task]] = {
     "ant": AntTask,
@@ -31,6 +41,9 @@ __all__ = [
     "AntTask",
     "Foraging",
     "GeneralMaze",
+    "HasFullReward",
+    "HasInitialPose",
+    "HasTiles",
     "Hunting",
     "Part",
     "Simulation",

@@ -1,13 +1,16 @@
-"""What every task offers to the other rooms."""
+"""What every task offers to the other rooms, and what only some tasks have."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from exneat_cli.compiling import compiled_lean
 
 RUNNING = 0
 """The episode goes on."""
@@ -17,20 +20,15 @@ FAILED = 2
 """The simulation exploded or a value was not finite; nothing that it gave counts."""
 
 
-FUNCTIONS = ("reset", "rewind", "observe", "step", "locate")
-"""What a module that simulates a task must define; see `Simulation`."""
-
-
 @dataclass(frozen=True)
 class Part:
-    """A place of the body with its own sensors, and maybe its own actuators.
+    """A part of the body with its own sensors, and maybe its own actuators.
 
     Attributes:
-        name: unique within the task, e.g. ``front_left``; named geometries go by it.
-        sensors: entries of the observation that this place senses.
-        actuators: entries of the action that move this place.
-        position: (x, y) of the place seen from the trunk, x ahead and y to the left, in the task's
-            length unit.
+        name: unique within the task, e.g. ``front_left``.
+        sensors: entries of what brains sense that this part senses.
+        actuators: entries of the action that move this part.
+        position: (x, y) of the part seen from the trunk, x ahead and y to the left, in the task's length unit.
     """
 
     name: str
@@ -39,20 +37,30 @@ class Part:
     position: tuple[float, float]
 
 
+@compiled_lean
+def locate_nowhere(world, row):  # type: ignore[no-untyped-def]
+    """Write nothing: for worlds in which the agent has no place."""
+
+
 @dataclass(frozen=True)
 class Simulation:
-    """One world and the five functions that run episodes in it; use it from one thread at a time.
+    """One world and the functions that run episodes in it; use it from one thread at a time.
 
-    The functions are compiled ones that take `world` as a tuple of arrays, or plain Python ones.
+    A step is: `observe`, sensor noise, `sense`, brain, `drive`, `step`. The functions are compiled ones that take
+    `world` as a tuple of arrays, or plain Python ones.
 
     Attributes:
-        world: the storage, first argument of all five.
+        world: the storage, first argument of all functions.
         reset: ``reset(world, rng)`` draws all the chance of a new world from a NumPy Generator, and starts it.
         rewind: ``rewind(world)`` takes the same world back to its start.
-        observe: ``observe(world, observation)`` writes the noiseless observation.
+        observe: ``observe(world, readings)`` writes the noiseless readings, (`Task.observation_size`,).
         step: ``step(world, action, terms)`` acts once, writes this step's reward terms and returns
             `RUNNING`, `ENDED` or `FAILED`.
         locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`.
+        sense: ``sense(world, readings, sensed)`` turns noisy readings into what brains sense,
+            (`Task.sensed_size`,); None where that is the same.
+        drive: ``drive(world, action)`` turns what brains put out into what `step` takes, in place; None where
+            that is the same.
         compiled: whether the functions are compiled.
         owner: keeps alive what `world` only points to.
     """
@@ -62,90 +70,102 @@ class Simulation:
     rewind: Callable[..., Any]
     observe: Callable[..., Any]
     step: Callable[..., Any]
-    locate: Callable[..., Any]
-    compiled: bool
+    locate: Callable[..., Any] = locate_nowhere
+    sense: Callable[..., Any] | None = None
+    drive: Callable[..., Any] | None = None
+    compiled: bool = True
     owner: object = None
 
-    @classmethod
-    def of(cls, functions: Any, world: object, *, compiled: bool = True, **others: Any) -> Simulation:
-        """A simulation whose functions are those of a module or namespace, unless `others` names one.
 
-        Args:
-            functions: has `reset`, `rewind`, `observe`, `step` and `locate`.
-            world: the storage they work on.
-            compiled: whether they are compiled.
-            others: replace single fields, e.g. `reset` or `owner`.
-        """
-        named = {name: getattr(functions, name, None) for name in FUNCTIONS}
-        return cls(world=world, compiled=compiled, **{**named, **others})
-
-
-class Task(Protocol):
-    """A task's parameters, and what follows from them."""
+class Task(ABC):
+    """A task's parameters, a frozen dataclass with range checks, and what follows from them."""
 
     terms: ClassVar[tuple[str, ...]]
     """Names of the reward terms that `Simulation.step` writes."""
-    fitness_name: ClassVar[str]
+    fitness_name: ClassVar[str] = "fitness"
     """What the fitness is, in words, for sentences and axes."""
-    fitness_decimals: ClassVar[int]
+    fitness_decimals: ClassVar[int] = 3
     """Digits after the point that mean something to a reader."""
-    failure_floor: ClassVar[float]
+    failure_floor: ClassVar[float] = 0.0
     """Fitness of an episode that failed."""
-    observation_limits: ClassVar[tuple[float, float]]
-    """What noisy inputs are clipped to."""
-    tie_noise: ClassVar[float]
+    observation_limits: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
+    """What noisy readings are clipped to."""
+    tie_noise: ClassVar[float] = 0.0
     """U(0, tie_noise) is added to each entry of the action, where the largest one wins."""
-    needs_memory: ClassVar[bool]
-    """Whether networks are recurrent by default."""
-    has_full_reward: ClassVar[bool]
-    """Whether there is a second figure besides the fitness."""
-    has_initial_pose: ClassVar[bool]
-    """Whether `noise.reset_scale` means anything."""
+    recurrent: ClassVar[bool] = False
+    """Whether networks are recurrent unless told otherwise."""
+    trace_columns: ClassVar[tuple[str, ...]] = ()
+    """Names of what `Simulation.locate` writes."""
+    trunk: ClassVar[Part | None] = None
+    """What belongs to no part, for a central module."""
+
+    name: str
+    """The task's name in `conf/task` and in run directories."""
 
     @property
-    def name(self) -> str:
-        """The task's name in `conf/task` and in run directories."""
-
-    @property
-    def trace_columns(self) -> tuple[str, ...]:
-        """Names of what `Simulation.locate` writes."""
-
-    @property
-    def resting_action(self) -> NDArray[np.float64]:
-        """The action that does nothing, (actuators,)."""
-
-    @property
+    @abstractmethod
     def parts(self) -> tuple[Part, ...]:
-        """The places of the body, in the order that a geometry vector indexes."""
+        """The parts of the body, in the order that a geometry vector indexes."""
 
     @property
-    def trunk(self) -> Part | None:
-        """What belongs to no part, for a central module; None if there is no such thing."""
-
-    @property
+    @abstractmethod
     def observation_size(self) -> int:
-        """Length of the observation."""
+        """Length of what the sensors read."""
 
     @property
+    @abstractmethod
     def actuator_names(self) -> tuple[str, ...]:
         """One name per entry of the action."""
 
     @property
+    @abstractmethod
     def longest_episode(self) -> int:
         """Control steps that no episode exceeds."""
+
+    @abstractmethod
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new world; `training` switches on what belongs to training only, such as early stopping."""
+
+    @property
+    def sensed_size(self) -> int:
+        """Length of what brains sense: the readings, unless the world has a `sense` of its own."""
+        return self.observation_size
 
     @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest sensible action, one entry per actuator."""
+        ones = np.ones(len(self.actuator_names))
+        return -ones, ones
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new world; `training` switches on what belongs to training only, such as early stopping."""
-
-    def tiles(self, world: Any) -> NDArray[np.float64] | None:
-        """(N, N, 3) path (1 or 0) and both channels of every tile of a grid world; None elsewhere."""
+    @property
+    def resting_action(self) -> NDArray[np.float64]:
+        """The action that does nothing, (actuators,)."""
+        return np.zeros(len(self.actuator_names))
 
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""
+        return np.asarray(np.sum(totals, axis=-1))
+
+
+@runtime_checkable
+class HasTiles(Protocol):
+    """A task whose world can be drawn as tiles."""
+
+    def tiles(self, world: Any) -> NDArray[np.float64]:
+        """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
+
+
+@runtime_checkable
+class HasInitialPose(Protocol):
+    """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
+
+    def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
+        """Open a new world, with noise of this size on the initial pose."""
+
+
+@runtime_checkable
+class HasFullReward(Protocol):
+    """A task with a second figure besides the fitness."""
 
     def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(...) the second figure that tests report; equals the fitness where a task has only one."""
+        """(...) the second figure that tests report."""

@@ -1,21 +1,27 @@
 """Who senses and who drives what: geometry, linkage and the plan that follows. Pure data."""
 
 from exneat_cli.wiring.geometry import GEOMETRIES, Geometry
-from exneat_cli.wiring.linkage import LINKAGES, counter_clockwise
+from exneat_cli.wiring.linkage import LINKAGES, Linkage, Sizes, counter_clockwise
+from exneat_cli.wiring.moments import Moments, merged, pooled_by_pin
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan
-from exneat_cli.wiring.planning import ALGORITHMS, UNTRAINED, Wiring, plan_wiring
+from exneat_cli.wiring.planning import Wiring, plan_body, plan_modules, refuse_modules
 
 __all__ = [
-    "ALGORITHMS",
     "CENTRAL",
     "GEOMETRIES",
     "LINKAGES",
-    "UNTRAINED",
     "Geometry",
+    "Linkage",
     "Module",
+    "Moments",
     "Pin",
     "Plan",
+    "Sizes",
     "Wiring",
     "counter_clockwise",
-    "plan_wiring",
+    "merged",
+    "plan_body",
+    "plan_modules",
+    "pooled_by_pin",
+    "refuse_modules",
 ]

@@ -1,4 +1,4 @@
-"""Linkage: which extra pins run between modules.
+"""Linkage: which extra pins run between modules. A linkage is one function, found by its name in `LINKAGES`.
 
 Links read the value of the previous step. Source: Zhang (2025), sections 3.1.1 and 3.2.3; the thesis'
 "linked" agents are `hidden` (34 inputs = 22 sensors + 3 peers x 4 hidden nodes).
@@ -7,12 +7,28 @@ Links read the value of the previous step. Source: Zhang (2025), sections 3.1.1 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from exneat_cli.tasks import Part
 from exneat_cli.wiring.plan import Pin
 
-LINKAGES = ("none", "output", "hidden", "feedback", "full")
+
+class Sizes(NamedTuple):
+    """What a linkage can read; module k serves part k, and the central module comes after them.
+
+    Attributes:
+        outputs: number of outputs of each part module; its output nodes are 0 to outputs - 1.
+        hidden: number of initial hidden nodes of a part module; they follow the outputs.
+    """
+
+    outputs: tuple[int, ...]
+    hidden: int
+
+
+Linkage = Callable[[Sequence[Part], int, Sizes], tuple[Pin, ...]]
+"""``linkage(parts, own, sizes)``: the extra pins of the module that serves ``parts[own]``. Whether it needs a
+central module (number ``len(parts)``) or hidden nodes follows from the pins that it returns."""
 
 
 def counter_clockwise(parts: Sequence[Part], own: int) -> list[int]:
@@ -31,26 +47,39 @@ def counter_clockwise(parts: Sequence[Part], own: int) -> list[int]:
     return sorted(others, key=lambda index: ((angle(index) - angle(own)) % turn, index))
 
 
-def link_pins(
-    linkage: str, parts: Sequence[Part], own: int, *, outputs: Sequence[int], hidden: int, central: int
-) -> tuple[Pin, ...]:
-    """Extra pins of the part module `own`: peers' outputs, peers' hidden nodes, the central outputs.
+def none(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """No links."""
+    return ()
 
-    Args:
-        linkage: one of `LINKAGES`.
-        parts: all parts; module k serves part k.
-        own: index of the module whose pins are wanted.
-        outputs: number of outputs of each part module.
-        hidden: number of initial hidden nodes of a part module.
-        central: index of the central module, read by `feedback` and `full`. Its outputs come in the
-            same relative order as peers: those that move the own part, then counter-clockwise.
-    """
+
+def output(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """The outputs of every other part module."""
     peers = counter_clockwise(parts, own)
-    pins: list[Pin] = []
-    if linkage in ("output", "full"):
-        pins += [Pin("output", k, peer, delayed=True) for peer in peers for k in range(outputs[peer])]
-    if linkage in ("hidden", "full"):
-        pins += [Pin("hidden", k, peer, delayed=True) for peer in peers for k in range(hidden)]
-    if linkage in ("feedback", "full"):
-        pins += [Pin("output", a, central, delayed=True) for s in [own, *peers] for a in parts[s].actuators]
-    return tuple(pins)
+    return tuple(Pin(k, peer, delayed=True) for peer in peers for k in range(sizes.outputs[peer]))
+
+
+def hidden(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """The initial hidden nodes of every other part module."""
+    peers = counter_clockwise(parts, own)
+    return tuple(Pin(sizes.outputs[peer] + k, peer, delayed=True) for peer in peers for k in range(sizes.hidden))
+
+
+def feedback(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """The outputs of the central module, first those that move the own part, then those of its peers."""
+    order = [own, *counter_clockwise(parts, own)]
+    return tuple(Pin(actuator, len(parts), delayed=True) for k in order for actuator in parts[k].actuators)
+
+
+def full(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """All three."""
+    return output(parts, own, sizes) + hidden(parts, own, sizes) + feedback(parts, own, sizes)
+
+
+LINKAGES: dict[str, Linkage] = {
+    "none": none,
+    "output": output,
+    "hidden": hidden,
+    "feedback": feedback,
+    "full": full,
+}
+"""Every linkage by its name on the command line."""

@@ -18,18 +18,20 @@ class Pin:
     """One input of a module.
 
     Attributes:
-        kind: ``sensor`` (entry of the observation), ``output`` (of a module) or ``hidden`` (initial
-            hidden node of a module).
-        index: which entry, output or hidden node, counted from 0.
+        index: which entry of what is sensed, or which node of `module`: outputs from 0, then initial hidden nodes.
         module: index of the module that is read; -1 for a sensor.
         delayed: whether the value of the previous step is read, 0 at the first; links are delayed, the
             central module's view of its encoders is not.
     """
 
-    kind: str
     index: int
     module: int = -1
     delayed: bool = False
+
+    @property
+    def is_sensor(self) -> bool:
+        """Whether it reads what is sensed, not a module."""
+        return self.module < 0
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ class Module:
 
     @property
     def sensors(self) -> tuple[int, ...]:
-        """Entries of the observation that it senses itself."""
-        return tuple(pin.index for pin in self.pins if pin.kind == "sensor")
+        """Entries of what is sensed that it senses itself."""
+        return tuple(pin.index for pin in self.pins if pin.is_sensor)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -71,7 +73,7 @@ class Plan:
 
     Attributes:
         modules: part modules in the task's order, then the central module if there is one.
-        observation_size: length of the observation.
+        observation_size: length of what is sensed.
         action_size: length of the action.
     """
 
@@ -118,18 +120,25 @@ class Plan:
                 raise ValueError(f"{module.name} and {other.name} share genomes, but not numbers of pins and nodes")
 
     def _readable(self, pin: Pin) -> int:
-        if pin.kind == "sensor":
+        if pin.is_sensor:
             return self.observation_size
-        if pin.kind not in ("output", "hidden") or not 0 <= pin.module < len(self.modules):
+        if pin.module >= len(self.modules):
             return 0
         source = self.modules[pin.module]
-        return source.outputs if pin.kind == "output" else source.hidden
+        return source.outputs + source.hidden
+
+    def kind_of(self, pin: Pin) -> str:
+        """What a pin of this plan reads, in a word: ``sensor``, ``output`` or ``hidden``."""
+        if pin.is_sensor:
+            return "sensor"
+        return "output" if pin.index < self.modules[pin.module].outputs else "hidden"
 
     def hidden_is_linked(self, module: int) -> bool:
         """Whether another module reads hidden nodes of `module`."""
-        return any(pin.kind == "hidden" and pin.module == module for m in self.modules for pin in m.pins)
+        first = self.modules[module].outputs
+        return any(pin.module == module and pin.index >= first for m in self.modules for pin in m.pins)
 
 
 def sensor_pins(indices: Sequence[int]) -> tuple[Pin, ...]:
     """One pin per entry of the observation."""
-    return tuple(Pin("sensor", index) for index in indices)
+    return tuple(Pin(index) for index in indices)

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 
-def reads(index: int, module: int = -1, *, delayed: bool = False, outputs: int = 1) -> dict[str, Any]:
-    """A pin: an entry of the observation, or a node of a module with so many outputs."""
-    if module == -1:
-        return {"kind": "sensor", "index": index, "module": -1, "delayed": delayed}
-    kind, first = ("hidden", outputs) if index >= outputs else ("output", 0)
-    return {"kind": kind, "index": index - first, "module": module, "delayed": delayed}
+def reads(index: int, module: int = -1, *, delayed: bool = False) -> dict[str, Any]:
+    """A pin: an entry of the observation, or a node of a module."""
+    return {"index": index, "module": module, "delayed": delayed}
 
 
 def a_module(name: str, position: tuple[float, float], subpopulation: int, **others: Any) -> dict[str, Any]:
@@ -41,7 +38,7 @@ def a_champion(
     modules: Sequence[dict[str, Any]], genomes: Sequence[dict[str, Any]], actuators: Sequence[str], sensors: int
 ) -> dict[str, Any]:
     return {
-        "format": 1,
+        "format": 2,
         "variant": "made-up",
         "task": {"name": "made_up"},
         "actuators": list(actuators),

@@ -11,13 +11,13 @@ import numpy as np
 from exneat_cli.analysis.study import PlannedRun, Study
 from exneat_cli.records import (
     DONE,
-    HistoryRow,
     RobustnessRow,
     RunDirectory,
     merge_robustness,
     write_history,
     write_json,
 )
+from exneat_cli.records.history import COLUMNS
 from tests.analysis.fake_champions import grid_champion, modular_champion
 
 Levels = Mapping[tuple[str, float], tuple[float, float]]
@@ -61,6 +61,11 @@ def plan_study(
     )
 
 
+def history_row(*figures: float) -> dict[str, int | float]:
+    """A row of history.csv, in the order of its columns."""
+    return dict(zip(COLUMNS, figures, strict=True))
+
+
 def finish(
     run: PlannedRun,
     curve: Sequence[float] = (),
@@ -82,7 +87,7 @@ def finish(
     if curve:
         per_generation = env_steps // len(curve)
         rows = [
-            HistoryRow(g, b, b, b, b, 10 * g, (per_generation + run.seed) * g, 1, 9, 0, 0, 0, 0.1 * g)
+            history_row(g, b, b, b, b, 10 * g, (per_generation + run.seed) * g, 1, 9, 0, 0, 0, 0.1 * g)
             for g, b in enumerate(curve, start=1)
         ]
         write_history(directory.history, rows)

@@ -9,36 +9,36 @@ import pytest
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
 from exneat_cli.records import (
     UNPERTURBED,
-    HistoryRow,
     RobustnessRow,
     RunDirectory,
     merge_robustness,
     write_csv,
     write_history,
 )
-from tests.analysis.fake_studies import contents, has_white_edges
+from tests.analysis.fake_studies import contents, has_white_edges, history_row
 
 
 def labels(count: int) -> dict[str, str]:
     return {f"sweep_{k}": f"label {k}" for k in range(count)}
 
 
-def a_run(directory: Path, sweeps: int = 1, generations: int = 8, tiles: bool = False) -> RunDirectory:
+def a_run(directory: Path, sweeps: int = 1, generations: int = 8, place: str = "ground") -> RunDirectory:
     run = RunDirectory(directory)
     directory.mkdir(parents=True)
     numbers = range(1, generations + 1)
-    rows = [HistoryRow(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in numbers]
+    rows = [history_row(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in numbers]
     write_history(run.history, rows)
     swept = [(sweep, level) for sweep in labels(sweeps) for level in (0.0, 0.5, 1.0)]
     figures = [(place, 0.8 - 0.2 * place[1]) for place in [(UNPERTURBED, 0.0), *swept]]
     merge_robustness(run.robustness, [RobustnessRow("exneat", 0, *at, 20, f, 0.1, f, 0.1) for at, f in figures])
-    if tiles:
+    if place == "tiles":
         columns = ["row", "column", "path", "channel_1", "channel_2"]
         write_csv(run.tiles, columns, [(r, c, int(r != c), 0.1 * r, 0.1 * c) for r in range(4) for c in range(5)])
         columns = ["step", "row", "column", "goal_row", "goal_column", "prey_1_row", "prey_1_column", "prey_1_free"]
         write_csv(run.trace, columns, [(t, t % 4, t // 2, 3, 4, 2, t % 3, int(t < 4)) for t in range(8)])
     else:
-        write_csv(run.trace, ["step", "x", "y"], [(t, 0.1 * t, 0.01 * t * t) for t in range(50)])
+        columns = ["step", "x", "y"] if place == "ground" else ["step", "speed", "cost"]
+        write_csv(run.trace, columns, [(t, 0.1 * t, 0.01 * t * t) for t in range(50)])
     return run
 
 
@@ -46,9 +46,9 @@ def draw_all(run: RunDirectory) -> list[Path]:
     return [*draw_training(run, "forward reward"), *draw_path(run), *draw_robustness(run, labels(4), "forward reward")]
 
 
-@pytest.mark.parametrize("tiles", [False, True])
-def test_the_same_data_gives_the_same_bytes_and_nothing_is_cut_off(tmp_path: Path, tiles: bool) -> None:
-    one, other = (a_run(tmp_path / place / "run", sweeps=4, tiles=tiles) for place in ("a", "b"))
+@pytest.mark.parametrize("place", ["ground", "tiles", "nowhere"])
+def test_the_same_data_gives_the_same_bytes_and_nothing_is_cut_off(tmp_path: Path, place: str) -> None:
+    one, other = (a_run(tmp_path / copy / "run", sweeps=4, place=place) for copy in ("a", "b"))
     written = draw_all(one)
     assert [path.stem for path in written] == ["training"] * 2 + ["path"] * 2 + ["robustness"] * 2
     assert all(has_white_edges(path) for path in written if path.suffix == ".png")

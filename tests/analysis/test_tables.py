@@ -27,7 +27,8 @@ def built(study: Study, directory: Path, columns: Mapping[str, Column], *rows: T
 
 
 def csv_of(table: Built, *index: str) -> pd.DataFrame:
-    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str, "efficiency": str}).set_index(list(index))
+    table_read = pd.read_csv(table.paths[0], dtype={"mean": str, "published": str, "efficiency": str})
+    return table_read.set_index(list(index)) if index else table_read
 
 
 def lines_of(study: Study, directory: Path, columns: Mapping[str, Column], *rows: TableRow) -> pd.DataFrame:

@@ -57,6 +57,12 @@ def unpack(columns: Mapping[str, NDArray[Any]], kind: type[Any] = ArrayGenome) -
     ]
 
 
+def columns_of(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Columns:
+    """The columns whose names begin with ``prefix.``, without it."""
+    start = f"{prefix}."
+    return {name.removeprefix(start): column for name, column in arrays.items() if name.startswith(start)}
+
+
 def _table(columns: Mapping[str, NDArray[Any]], prefix: str, dtype: np.dtype[np.void], length: int) -> NDArray[np.void]:
     table = np.zeros(length, dtype)
     for name in dtype.names or ():

@@ -50,7 +50,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         self.render_mode = render_mode
         self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (self.task.observation_size,), np.float64)
         self.action_space = gymnasium.spaces.Discrete(len(MOVES))
-        self._simulation = self.task.open(training=False, reset_scale=0.0)
+        self._simulation = self.task.open(training=False)
         self._observation = np.zeros(self.task.observation_size)
 
     def reset(

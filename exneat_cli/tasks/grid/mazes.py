@@ -11,12 +11,13 @@ Source: Zhang (2025), section 3.2.1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
 from exneat_cli.tasks.grid import maze_dynamics
-from exneat_cli.tasks.grid.maze_dynamics import SPARE_STEPS, new_maze
+from exneat_cli.tasks.grid.maze_dynamics import SPARE_STEPS, Maze, new_maze
 from exneat_cli.tasks.grid.world import GridTask
 from exneat_cli.tasks.task import Simulation
 
@@ -34,10 +35,8 @@ class _MazeTask(GridTask):
     size: int
     terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
 
-    @property
-    def trace_columns(self) -> tuple[str, ...]:
-        """Row and column of the agent, then of the goal."""
-        return ("row", "column", "goal_row", "goal_column")
+    trace_columns: ClassVar[tuple[str, ...]] = ("row", "column", "goal_row", "goal_column")
+    """Row and column of the agent, then of the goal."""
 
     @property
     def longest_episode(self) -> int:
@@ -73,10 +72,10 @@ class TrackMaze(_MazeTask):
         check_real("task.cue_noise", self.cue_noise, 0.0)
         check_choice("task.fitness", self.fitness, list(TIME_SHARES))
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new track; neither argument matters here."""
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new track."""
         maze = new_maze(self.size, gap=self.gap, cue_noise=self.cue_noise, time_share=TIME_SHARES[self.fitness])
-        return Simulation.of(maze_dynamics, maze, reset=maze_dynamics.reset_track)
+        return _simulation(maze, maze_dynamics.reset_track)
 
 
 @dataclass(frozen=True)
@@ -110,8 +109,8 @@ class GeneralMaze(_MazeTask):
         check_real("task.walls_removed", self.walls_removed, 0.0, 1.0)
         check_choice("task.fitness", self.fitness, list(TIME_SHARES))
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new maze; neither argument matters here."""
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new maze."""
         maze = new_maze(
             self.size,
             cue_noise=self.cue_noise,
@@ -119,4 +118,10 @@ class GeneralMaze(_MazeTask):
             walls_removed=self.walls_removed,
             time_share=TIME_SHARES[self.fitness],
         )
-        return Simulation.of(maze_dynamics, maze, reset=maze_dynamics.reset_general)
+        return _simulation(maze, maze_dynamics.reset_general)
+
+
+def _simulation(maze: Maze, reset: Callable[..., None]) -> Simulation:
+    return Simulation(
+        maze, reset, maze_dynamics.rewind, maze_dynamics.observe, maze_dynamics.step, maze_dynamics.locate
+    )

@@ -78,7 +78,7 @@ class Foraging(GridTask):
             raise ConfigError("task.steps", f"at most {most_steps} for this size and n_prey", self.steps, fix)
 
     @property
-    def trace_columns(self) -> tuple[str, ...]:
+    def trace_columns(self) -> tuple[str, ...]:  # type: ignore[override]
         """The agent's row and column, then row, column and freedom (1 free, 0 caught) of each prey."""
         prey = [f"prey_{k}_{what}" for k in range(self.n_prey) for what in ("row", "column", "free")]
         return ("row", "column", *prey)
@@ -94,9 +94,9 @@ class Foraging(GridTask):
         prey_dynamics.paint(world, signals)
         return np.stack([world.grid.path, *signals], axis=2)
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new field; neither argument matters here."""
-        return Simulation.of(prey_dynamics, self._field(motion=0.0, levy=False))
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new field."""
+        return _simulation(self._field(motion=0.0, levy=False))
 
     def _field(self, *, motion: float, levy: bool) -> Field:
         return new_field(
@@ -136,6 +136,11 @@ class Hunting(Foraging):
         check_real("task.p_m", self.p_m, 0.0, 1.0)
         check_choice("task.motion", self.motion, MOTIONS)
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new field; neither argument matters here."""
-        return Simulation.of(prey_dynamics, self._field(motion=self.p_m, levy=self.motion == "levy"))
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new field."""
+        return _simulation(self._field(motion=self.p_m, levy=self.motion == "levy"))
+
+
+def _simulation(field: Field) -> Simulation:
+    functions = (prey_dynamics.reset, prey_dynamics.rewind, prey_dynamics.observe, prey_dynamics.step)
+    return Simulation(field, *functions, prey_dynamics.locate)

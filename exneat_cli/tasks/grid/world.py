@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
-from exneat_cli.tasks.task import Part
+from exneat_cli.tasks.task import Part, Task
 
 CHANNELS = 2
 STAY = 4
@@ -59,18 +59,12 @@ def empty_grid(size: int) -> Grid:
     return Grid(np.zeros((CHANNELS, size, size)), np.zeros((size, size), np.int64), np.zeros(3, np.int64))
 
 
-class GridTask:
+class GridTask(Task):
     """The part of every grid world that follows from its sensors and moves alone."""
 
-    fitness_name: ClassVar[str] = "fitness"
-    fitness_decimals: ClassVar[int] = 3
-    failure_floor: ClassVar[float] = 0.0
     tie_noise: ClassVar[float] = 1e-3
-    needs_memory: ClassVar[bool] = True
-    has_full_reward: ClassVar[bool] = False
-    has_initial_pose: ClassVar[bool] = False
+    recurrent: ClassVar[bool] = True
     observation_limits: ClassVar[tuple[float, float]] = (0.0, 1.0)
-    trunk: ClassVar[None] = None
     observation_size: ClassVar[int] = 4 * CHANNELS
     actuator_names: ClassVar[tuple[str, ...]] = MOVES
 
@@ -98,14 +92,6 @@ class GridTask:
         """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
         tiles: NDArray[np.float64] = np.stack([world.grid.path, *world.grid.signals], axis=2)
         return tiles
-
-    def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rewards add up to the fitness of the episode."""
-        return np.asarray(np.sum(totals, axis=-1))
-
-    def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same: grid worlds have one figure."""
-        return self.fitness_of(totals)
 
 
 @compiled_lean

@@ -39,9 +39,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import check_choice, check_real, check_whole
-from exneat_cli.tasks.robots import ant_gymnasium, mujoco_library
+from exneat_cli.tasks.robots import dynamics, mujoco_library
 from exneat_cli.tasks.robots.parts import FORCES_PER_BODY, SKIPPED_POSITIONS, Limb, find_limbs
-from exneat_cli.tasks.task import Part, Simulation
+from exneat_cli.tasks.task import Part, Simulation, Task
 
 CONTROL_WEIGHTS = {"thesis": 0.01, "gymnasium": 0.5}
 """Weight of sum(action^2). The thesis' full reward is about 900 above its forward reward over 1000 steps,
@@ -54,11 +54,13 @@ HEALTHY_HEIGHTS = (0.2, 1.0)
 FORCE_LIMIT = 1.0
 SUBSTEPS = 5
 TRUNK_BODY = 1
+RESET_SCALE = 0.1
+"""Noise on the initial pose, the default of Gymnasium's Ant-v5."""
 ORDER_BY_POSITION = ("front_left", "front_right", "back_left", "back_right")
 
 
 @dataclass(frozen=True)
-class AntTask:
+class AntTask(Task):
     """Parameters of Ant.
 
     Attributes:
@@ -85,11 +87,8 @@ class AntTask:
     fitness_name: ClassVar[str] = "forward reward"
     fitness_decimals: ClassVar[int] = 1
     failure_floor: ClassVar[float] = -100.0
-    observation_limits: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
-    tie_noise: ClassVar[float] = 0.0
-    needs_memory: ClassVar[bool] = False
-    has_full_reward: ClassVar[bool] = True
-    has_initial_pose: ClassVar[bool] = True
+    trace_columns: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    """Position of the trunk in metres."""
 
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, ["ant"])
@@ -98,16 +97,6 @@ class AntTask:
         check_whole("task.max_steps", self.max_steps, 1, 1_000_000)
         check_real("task.progress", self.progress, 0.0)
         check_whole("task.patience", self.patience, 0, 1_000_000)
-
-    @property
-    def trace_columns(self) -> tuple[str, ...]:
-        """Position of the trunk in metres."""
-        return ("x", "y", "z")
-
-    @property
-    def resting_action(self) -> NDArray[np.float64]:
-        """No torque anywhere."""
-        return np.zeros(len(self.actuator_names))
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -119,7 +108,7 @@ class AntTask:
         return tuple(legs)
 
     @property
-    def trunk(self) -> Part:
+    def trunk(self) -> Part:  # type: ignore[override]
         """The trunk's 17 sensors; it has no actuators of its own."""
         trunk, _ = _limbs()
         return Part("trunk", trunk.sensors, trunk.actuators, trunk.position)
@@ -147,9 +136,6 @@ class AntTask:
         low, high = _model().actuator_ctrlrange.T
         return low.copy(), high.copy()
 
-    def tiles(self, world: object) -> None:
-        """Ant walks on an endless plane."""
-
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forward reward of an episode, in m/s summed over control steps."""
         return np.asarray(totals[..., 0])
@@ -158,29 +144,19 @@ class AntTask:
         """Forward and healthy reward less the costs of effort and contact."""
         return np.asarray(np.sum(totals, axis=-1))
 
-    def open(self, *, training: bool, reset_scale: float) -> Simulation:
-        """A new world, compiled where MuJoCo can be reached from compiled code, else over Gymnasium.
+    def open(self, *, training: bool) -> Simulation:
+        """Open a new world with Gymnasium's default noise on the initial pose."""
+        return self.open_disturbed(training=training, reset_scale=RESET_SCALE)
+
+    def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
+        """Open a new world.
 
         Args:
             training: whether an episode ends once the body makes no progress.
-            reset_scale: size of the noise on the initial pose; 0.1 is Gymnasium's default.
+            reset_scale: size of the noise on the initial pose.
         """
+        mujoco_library.load_library()
         mujoco_library.silence_warnings()
-        patience = self.patience if training else 0
-        if mujoco_library.unreachable_because() is None:
-            return self._open_compiled(patience, reset_scale)
-        world = ant_gymnasium.GymnasiumAnt(
-            self.max_steps,
-            self.progress,
-            patience,
-            reset_noise_scale=reset_scale,
-            ctrl_cost_weight=CONTROL_WEIGHTS[self.reward],
-        )
-        return Simulation.of(ant_gymnasium, world, compiled=False)
-
-    def _open_compiled(self, patience: int, reset_scale: float) -> Simulation:
-        from exneat_cli.tasks.robots import dynamics
-
         model = _model()
         data = mujoco.MjData(model)
         world = dynamics.AntWorld(
@@ -208,11 +184,12 @@ class AntTask:
             contact_weight=CONTACT_WEIGHT,
             max_steps=self.max_steps,
             progress=float(self.progress),
-            patience=patience,
+            patience=self.patience if training else 0,
             clock=np.zeros(3, dtype=np.int64),
             mark=np.zeros(1),
         )
-        return Simulation.of(dynamics, world, owner=(model, data))
+        functions = (dynamics.reset, dynamics.rewind, dynamics.observe, dynamics.step, dynamics.locate)
+        return Simulation(world, *functions, owner=(model, data))
 
 
 @functools.cache

@@ -15,6 +15,8 @@ import llvmlite.binding
 import mujoco
 from numba import types
 
+from exneat_cli.errors import ExneatError
+
 _ON_MODEL_AND_DATA = types.void(types.int64, types.int64)
 
 mj_step: Any = types.ExternalFunction("mj_step", _ON_MODEL_AND_DATA)
@@ -35,20 +37,24 @@ def find_library(directory: Path) -> Path | None:
 
 
 @functools.cache
-def unreachable_because() -> str | None:
-    """Why compiled code cannot call MuJoCo here, in words; None if it can."""
+def load_library() -> None:
+    """Let compiled code call MuJoCo.
+
+    Raises:
+        ExneatError: its library is not beside its Python bindings, cannot be loaded or lacks a function.
+    """
     directory = Path(mujoco.__file__).parent
     library = find_library(directory)
+    fix = "install MuJoCo from its wheel, which holds its library: pip install --force-reinstall mujoco"
     if library is None:
-        return f"no MuJoCo library beside its Python bindings in {directory}"
+        raise ExneatError(f"MuJoCo: expected its library in {directory}, got none\n  {fix}")
     try:
         llvmlite.binding.load_library_permanently(str(library))
     except RuntimeError as error:
-        return f"{library.name} could not be loaded: {error}"
+        raise ExneatError(f"MuJoCo: {library.name} could not be loaded: {error}\n  {fix}") from error
     missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
     if missing:
-        return f"{library.name} has no {', '.join(missing)}"
-    return None
+        raise ExneatError(f"MuJoCo: {library.name} has no {', '.join(missing)}\n  {fix}")
 
 
 @functools.cache

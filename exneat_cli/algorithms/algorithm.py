@@ -1,0 +1,179 @@
+"""What every algorithm offers: its settings, and a search in ask/tell form."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.algorithms.neat.genome import ArrayGenome
+from exneat_cli.algorithms.neat.settings import EvolutionSettings
+from exneat_cli.tasks import Task
+from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_modules
+
+
+class Team(NamedTuple):
+    """One genome from each subpopulation, evaluated together.
+
+    Attributes:
+        genomes: in the order of the subpopulations.
+        ids: their ids; a team that meets the next generation intact keeps them.
+    """
+
+    genomes: tuple[ArrayGenome, ...]
+    ids: tuple[int, ...]
+
+
+class Candidate(NamedTuple):
+    """A team that may become the champion.
+
+    Attributes:
+        team: the genomes.
+        fitness: what it was judged by in training.
+        generation: when, counted from 0.
+    """
+
+    team: Team
+    fitness: float
+    generation: int
+
+
+class Trials(NamedTuple):
+    """What an algorithm asks for.
+
+    Attributes:
+        teams: whose fitness it wants to know.
+        episodes: how many each of them gets, the same ones for all.
+    """
+
+    teams: Sequence[Team]
+    episodes: int
+
+
+class Results(NamedTuple):
+    """What an algorithm is told of T teams in E episodes.
+
+    Attributes:
+        fitness: (T, E); the task's failure floor where an episode failed.
+        failed: (T,) whether an episode of the team failed; such a team is nobody's best.
+        sensed: of the sensor pins of each subpopulation, (pins,) and pooled over teams and modules that share
+            it; only for algorithms that ask for it, see `Algorithm.wants_moments`. Pins that read modules count 0.
+    """
+
+    fitness: NDArray[np.float64]
+    failed: NDArray[np.bool_]
+    sensed: tuple[Moments, ...] = ()
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a search is about.
+
+    Attributes:
+        plan: who senses and drives what.
+        evolution: how genomes begin, change and compete.
+        population: teams per generation.
+        episodes: of each team and generation.
+        pairing: ``rank`` or ``index``, how subpopulations form teams.
+        seed: root of all random streams.
+    """
+
+    plan: Plan
+    evolution: EvolutionSettings
+    population: int
+    episodes: int
+    pairing: str
+    seed: int
+
+
+class State(NamedTuple):
+    """A search between two generations, as data.
+
+    Attributes:
+        plain: numbers, strings, lists and dicts.
+        arrays: columns of numbers by name.
+    """
+
+    plain: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+
+
+class Search(ABC):
+    """An algorithm at work. A generation is one or more turns of `ask` and `tell`."""
+
+    @abstractmethod
+    def ask(self) -> Trials:
+        """The teams to evaluate next.
+
+        Raises:
+            RuntimeError: the last ones were not told.
+        """
+
+    @abstractmethod
+    def tell(self, results: Results) -> bool:
+        """Take what the teams of the last `ask` got, in its order; returns whether the generation is over.
+
+        Raises:
+            RuntimeError: nothing was asked for.
+            ValueError: the number of teams is wrong, or a fitness is not finite.
+        """
+
+    @abstractmethod
+    def candidates(self) -> list[Candidate]:
+        """Teams that it would hand over now, the best first; none of them failed."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """All that the rest of the search depends on, after a generation; taking it changes nothing."""
+
+    def columns(self) -> dict[str, int | float]:
+        """Its own columns of history.csv for the generation that is over."""
+        return {}
+
+
+class Algorithm(ABC):
+    """An algorithm's settings, a frozen dataclass with range checks; the base of those that train modules.
+
+    An algorithm that trains defines `start` and `restored`; one without training names a `rule`.
+    """
+
+    modular: ClassVar[bool] = True
+    """Whether geometry, linkage and wiring mean anything for it."""
+    wants_moments: ClassVar[bool] = False
+    """Whether it is told the statistics of what its networks sense, `Results.sensed`."""
+
+    name: str
+    """Its name in `conf/algorithm` and in run directories."""
+
+    @property
+    def rule(self) -> str | None:
+        """What acts instead of trained networks, see `exneat_cli.brains.rules`; None where something is trained."""
+        return None
+
+    def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
+        """Who senses and drives what.
+
+        Raises:
+            ConfigError: the combination makes no sense.
+        """
+        return plan_modules(task, geometry, linkage, wiring, hidden=evolution.module_hidden)
+
+    def start(self, problem: Problem) -> Search:
+        """Begin a search."""
+        raise TypeError(f"{self.name} trains nothing")
+
+    def restored(self, problem: Problem, state: State) -> Search:
+        """The search that `state` was taken of.
+
+        Args:
+            problem: as it was.
+            state: from `Search.state`, or from a file of anyone's.
+
+        Raises:
+            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is none, or does not fit.
+        """
+        raise TypeError(f"{self.name} trains nothing")

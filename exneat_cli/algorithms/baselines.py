@@ -1,0 +1,37 @@
+"""Baselines: agents that follow a rule, which nothing trains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from exneat_cli.algorithms.algorithm import Algorithm
+from exneat_cli.algorithms.neat.settings import EvolutionSettings
+from exneat_cli.errors import ConfigError, check_choice
+from exneat_cli.tasks import Task
+from exneat_cli.wiring import Geometry, Plan, Wiring, refuse_modules
+
+BASELINES = ("random", "motionless", "linear_fusion")
+
+
+@dataclass(frozen=True)
+class Baseline(Algorithm):
+    """A rule, which `exneat_cli.brains.rules` resolves by its name."""
+
+    name: str = "random"
+    modular = False
+
+    def __post_init__(self) -> None:
+        check_choice("algorithm.name", self.name, BASELINES)
+
+    @property
+    def rule(self) -> str:
+        """Its name."""
+        return self.name
+
+    def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
+        """No modules at all."""
+        refuse_modules(self.name, geometry, linkage, wiring)
+        if self.name == "linear_fusion" and any(len(part.actuators) != 1 for part in task.parts):
+            fix = "it moves to where the sum of a part's sensors is largest, so only grid worlds have it"
+            raise ConfigError("algorithm", "exneat, neat or random", self.name, fix)
+        return Plan((), task.sensed_size, len(task.actuator_names))

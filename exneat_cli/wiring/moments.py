@@ -1,0 +1,62 @@
+"""Statistics of what brains sense: per entry while episodes run, pooled per pin for algorithms that ask for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.wiring.plan import Plan
+
+
+class Moments(NamedTuple):
+    """Counts, means and sums of squared deviations of numbers that came one after another; of equal shapes."""
+
+    counts: NDArray[np.float64]
+    means: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+
+def merged(parts: Iterable[Moments], size: int) -> Moments:
+    """The moments of all parts together, (size,); the order of the parts decides the last bits.
+
+    Source: Chan, Golub and LeVeque, "Updating formulae and a pairwise algorithm for computing sample variances",
+    1979.
+    """
+    count, mean, squares = np.zeros((3, size))
+    for part in parts:
+        together = count + part.counts
+        share = np.divide(part.counts, together, out=np.zeros(size), where=together > 0)
+        step = part.means - mean
+        squares = squares + part.squares + step * step * count * share
+        mean = mean + step * share
+        count = together
+    return Moments(count, mean, squares)
+
+
+def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:
+    """Of each subpopulation, the moments of its pins, (pins,), over teams and the modules that share it.
+
+    Teams are merged in their order, within a team modules in theirs. Pins that read modules count 0.
+
+    Args:
+        plan: who senses what.
+        teams: (T, sensed) of what each team's brain sensed.
+    """
+    found = []
+    for index, (pins, _, _) in enumerate(plan.subpopulation_shapes):
+        sharers = [module for module in plan.modules if module.subpopulation == index]
+        parts = [
+            _of_pins(teams, t, [pin.index if pin.is_sensor else -1 for pin in module.pins])
+            for t in range(len(teams.counts))
+            for module in sharers
+        ]
+        found.append(merged(parts, pins))
+    return tuple(found)
+
+
+def _of_pins(teams: Moments, team: int, entries: list[int]) -> Moments:
+    senses = np.array(entries) >= 0
+    return Moments(*(np.where(senses, values[team, entries], 0.0) for values in teams))
