@@ -11,6 +11,7 @@ import numpy as np
 from exneat_cli.analysis.study import PlannedRun, Study
 from exneat_cli.records import (
     DONE,
+    MANIFEST_FORMAT,
     RobustnessRow,
     RunDirectory,
     merge_robustness,
@@ -18,7 +19,7 @@ from exneat_cli.records import (
     write_json,
 )
 from exneat_cli.records.history import COLUMNS
-from tests.analysis.fake_champions import grid_champion, modular_champion
+from tests.analysis.fake_champions import a_score, grid_champion, modular_champion
 
 Levels = Mapping[tuple[str, float], tuple[float, float]]
 """(sweep, level) -> mean fitness and mean full reward."""
@@ -81,9 +82,17 @@ def finish(
     """Write what a finished run leaves; without a curve it is that of a baseline."""
     directory = run.directory
     directory.path.mkdir(parents=True)
-    champion = {"episodes": 20, "fitness_mean": test, "fitness_std": 0.1, "full_reward_mean": full_reward}
-    result: dict[str, object] = {"champion": champion}
-    manifest: dict[str, object] = {"status": DONE, "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"})}
+    result: dict[str, object] = {"champion": a_score(test, full_reward), "standing_still": a_score(0.0, 0.0)}
+    manifest: dict[str, object] = {
+        "format": MANIFEST_FORMAT,
+        "status": DONE,
+        "variant": run.variant,
+        "task": "made_up",
+        "seed": run.seed,
+        "configuration_hash": "0",
+        "generations": len(curve),
+        "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"}),
+    }
     if curve:
         per_generation = env_steps // len(curve)
         rows = [

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
@@ -14,14 +15,23 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
 from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings, Problem
-from exneat_cli.analysis.network_data import ChampionGraph, Edge, champion_graph, read_champion_graph
+from exneat_cli.analysis.network_data import ChampionGraph, Edge
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import depths, lay_out, natural_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory, write_champion, write_json
+from exneat_cli.records import Champion, Genome, RunDirectory, Scores, write_json
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry, Wiring
-from tests.analysis.fake_champions import a_champion, a_genome, a_module, grid_champion, modular_champion, reads
+from tests.analysis.fake_champions import (
+    a_champion,
+    a_genome,
+    a_module,
+    a_score,
+    graph_of,
+    grid_champion,
+    modular_champion,
+    reads,
+)
 from tests.analysis.fake_studies import contents, has_white_edges
 
 FRONT_LEFT, FRONT_RIGHT, BACK_LEFT, BACK_RIGHT, CENTRAL = range(5)
@@ -44,7 +54,7 @@ def test_a_cycle_is_entered_where_inputs_reach_it() -> None:
 
 
 def laid_out(content: dict[str, Any]) -> Any:
-    graph = champion_graph(content)
+    graph = graph_of(content)
     return lay_out(graph, *natural_size(graph))
 
 
@@ -64,7 +74,7 @@ def test_a_connection_never_seems_to_end_at_a_node_that_it_only_passes() -> None
 
 @pytest.mark.parametrize("content", [grid_champion(), modular_champion()], ids=["grid", "modular"])
 def test_every_node_stands_inside_the_box_of_its_module(content: dict[str, Any]) -> None:
-    graph = champion_graph(content)
+    graph = graph_of(content)
     boxes, places = laid_out(content)
     for m, module in enumerate(graph.plan.modules):
         assert len(places[m]) == len(module.pins) + module.outputs + len(graph.hidden[m])
@@ -72,8 +82,8 @@ def test_every_node_stands_inside_the_box_of_its_module(content: dict[str, Any])
 
 
 def test_a_node_is_used_on_a_path_from_a_sensor_to_an_actuator_by_way_of_any_module() -> None:
-    assert champion_graph(grid_champion()).used == {(0, key) for key in (-1, -2, 0, 1, 2, 3)}
-    used = champion_graph(modular_champion()).used
+    assert graph_of(grid_champion()).used == {(0, key) for key in (-1, -2, 0, 1, 2, 3)}
+    used = graph_of(modular_champion()).used
     assert (BACK_RIGHT, 0) not in used, "nothing reads its output"
     assert (BACK_RIGHT, 1) in used, "the back left leg reads its hidden node"
     assert all((leg, 0) in used for leg in (FRONT_LEFT, FRONT_RIGHT, BACK_LEFT))
@@ -82,25 +92,25 @@ def test_a_node_is_used_on_a_path_from_a_sensor_to_an_actuator_by_way_of_any_mod
 def test_a_disabled_connection_is_neither_drawn_nor_a_path() -> None:
     content = grid_champion()
     content["genomes"][0]["connections"][0]["enabled"] = False
-    graph = champion_graph(content)
+    graph = graph_of(content)
     assert all(edge.source != -1 for edge in graph.edges[0])
     assert graph.used == {(0, -2), (0, 1)}
 
 
 def test_links_run_between_the_modules_that_the_plan_names_unless_the_node_was_deleted() -> None:
     content = modular_champion()
-    links = champion_graph(content).links
+    links = graph_of(content).links
     delayed = {(link.source, link.target) for link in links if link.delayed}
     prompt = {(link.source, link.target) for link in links if not link.delayed}
     # Each leg's third pin reads the hidden node of the next leg, which is node 1.
     assert delayed == {(((k + 1) % 4, 1), (k, -3)) for k in range(4)}
     assert prompt == {((leg, 0), (CENTRAL, -2 - leg)) for leg in range(3)}
     content["genomes"][0] = a_genome([0], [(-1, 0, 0.5)])
-    assert not any(link.delayed for link in champion_graph(content).links)
+    assert not any(link.delayed for link in graph_of(content).links)
 
 
 def test_modules_that_share_a_genome_show_the_same_weights() -> None:
-    *legs, _ = champion_graph(modular_champion()).edges
+    *legs, _ = graph_of(modular_champion()).edges
     assert all(set(leg) == {(-1, 1, 0.5), (-2, 1, -0.8), (-3, 1, 0.2), (1, 0, 1.2)} for leg in legs)
 
 
@@ -130,7 +140,7 @@ def axes_of(graph: ChampionGraph) -> Axes:
 
 
 def test_colour_tells_the_sign_width_the_size_and_faintness_the_unused() -> None:
-    axes = axes_of(champion_graph(grid_champion()))
+    axes = axes_of(graph_of(grid_champion()))
     (edges,) = [each for each in axes.collections if isinstance(each, LineCollection)]
     # Lightest first: 0.3, -0.5, 1.0 (unused), -1.0, 1.5 and 2.0; the connection to itself is a loop.
     colours = [POSITIVE, NEGATIVE, POSITIVE, NEGATIVE, POSITIVE, POSITIVE]
@@ -143,7 +153,7 @@ def test_colour_tells_the_sign_width_the_size_and_faintness_the_unused() -> None
 
 
 def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_their_names() -> None:
-    axes = axes_of(champion_graph(modular_champion()))
+    axes = axes_of(graph_of(modular_champion()))
     links = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
     assert [link.get_linestyle() == "-" for link in links] == [False] * 4 + [True] * 3
     texts = {text.get_text() for text in axes.texts}
@@ -153,7 +163,7 @@ def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_th
 
 def test_the_legend_speaks_of_links_and_loops_only_where_there_are_any() -> None:
     grid, modular = (
-        " ".join(str(entry.get_label()) for entry in legend_entries([champion_graph(content)]))
+        " ".join(str(entry.get_label()) for entry in legend_entries([graph_of(content)]))
         for content in (grid_champion(), modular_champion())
     )
     assert "link" not in grid
@@ -196,9 +206,17 @@ def test_the_champions_that_runs_write_can_be_drawn(tmp_path: Path, algorithm: s
     settings, evolution = ALGORITHMS[algorithm](), EvolutionSettings(neat_hidden=4)
     plan = settings.plan(task, geometry, linkage, Wiring(), evolution)
     team = settings.start(Problem(plan, evolution, 4, 1, "rank", 0)).ask().teams[0]
-    scores = {"test": {"fitness_mean": 1.0, "fitness_std": 0.0, "episodes": 1}}
     run = RunDirectory(tmp_path)
-    write_champion(run.champion, Champion(algorithm, {}, task.actuator_names, True, plan, team.genomes, scores))
+    champion = Champion(
+        variant=algorithm,
+        task={},
+        actuators=task.actuator_names,
+        feed_forward=True,
+        scores=msgspec.convert({"test": a_score(1.0, 1.0)}, Scores),
+        plan=plan,
+        genomes=tuple(map(Genome.of, team.genomes)),
+    )
+    write_json(run.champion, champion)
     graph = read_champion_graph(run)
     assert len(graph.links) == (0 if algorithm == "neat" else 4 * (3 * 2 + 3 * 4 + 8) + 4 * 2)
     dots = [each for each in axes_of(graph).collections if isinstance(each, PathCollection)]

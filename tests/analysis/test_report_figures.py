@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 from msgspec.structs import replace as changed
 
@@ -105,7 +106,7 @@ def test_the_champion_shown_is_that_of_the_run_best_on_validation(tmp_path: Path
     study = plan_study(tmp_path, seeds=4)
     finish_all(study)
     directory = study.runs[1].directory
-    directory.update_manifest(result={**directory.read_manifest()["result"], "validation": 99.0})
+    directory.update_manifest(result=msgspec.structs.replace(directory.read_result(), validation=99.0))
     said = caption(a_plan("network"), study, tmp_path)
     assert "NEAT, no noise: seed 1, best on validation of 4 runs, budget quick, test fitness 0.75." in said
     assert "ExNEAT, no noise: seed 3, best on validation of 4 runs" in said

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from exneat_cli.analysis.study import read_csv
@@ -27,8 +28,7 @@ def test_the_best_on_validation_come_first_equal_ones_by_seed_and_those_without_
     for seed, validation in enumerate((0.2, 0.7, 0.9, 0.7)):
         finish(run_of(study, "calm", "neat", seed), (0.5,), validation=validation)
     directory = run_of(study, "calm", "neat", 2).directory
-    result = directory.read_manifest()["result"]
-    directory.update_manifest(result={key: value for key, value in result.items() if key != "validation"})
+    directory.update_manifest(result=msgspec.structs.replace(directory.read_result(), validation=None))
     assert [run.seed for run in study.best_first("calm", "neat")] == [1, 3, 0, 2]
 
 

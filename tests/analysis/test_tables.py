@@ -237,5 +237,5 @@ def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "report").write_text("a file")
-    with pytest.raises(ExneatError, match="report: cannot be made"):
+    with pytest.raises(ExneatError, match="report: expected a directory, got a file"):
         built(finish_all(plan_study(tmp_path)), tmp_path, PLAIN)
