@@ -25,6 +25,7 @@ Levels = Mapping[tuple[str, float], tuple[float, float]]
 """(sweep, level) -> mean fitness and mean full reward."""
 LEVELS = tuple(round(0.1 * k, 1) for k in range(6))
 SWEEPS = {"sensor_noise": "sensor noise (sd)", "gap": "gap before the goal (tiles)"}
+CONDITIONS = {"calm": "no noise", "noisy": "much noise"}
 VARIANTS = {"neat": "NEAT", "exneat": "ExNEAT", "random": "random actions"}
 
 
@@ -33,14 +34,12 @@ def plan_study(
     *,
     variants: Mapping[str, str] = VARIANTS,
     baselines: Sequence[str] = ("random",),
-    conditions: Mapping[str, str] | None = None,
+    conditions: Mapping[str, str] = CONDITIONS,
     seeds: int = 3,
     experiment: str = "track",
-    budget: str = "quick",
     has_full_reward: bool = False,
 ) -> Study:
     """A study none of whose runs is finished."""
-    conditions = conditions or {"calm": "no noise", "noisy": "much noise"}
     runs = tuple(
         PlannedRun(condition, variant, seed, RunDirectory(directory / experiment / f"{condition}-{variant}-s{seed}"))
         for condition in conditions
@@ -49,9 +48,9 @@ def plan_study(
     )
     return Study(
         experiment=experiment,
-        budget=budget,
+        budget="quick",
         claim="Small networks learn faster.",
-        command=f"exneat sweep experiment={experiment} budget={budget}",
+        command=f"exneat sweep experiment={experiment} budget=quick",
         fitness_name="forward reward" if has_full_reward else "fitness",
         has_full_reward=has_full_reward,
         variants=variants,
@@ -77,14 +76,14 @@ def finish(
     levels: Levels | None = None,
     episodes: int = 400,
     env_steps: int = 9000,
-    versions: Mapping[str, str] | None = None,
+    version: str = "0.1.0",
 ) -> None:
     """Write what a finished run leaves; without a curve it is that of a baseline."""
     directory = run.directory
     directory.path.mkdir(parents=True)
     champion = {"episodes": 20, "fitness_mean": test, "fitness_std": 0.1, "full_reward_mean": full_reward}
     result: dict[str, object] = {"champion": champion}
-    manifest: dict[str, object] = {"status": DONE, "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"})}
+    manifest: dict[str, object] = {"status": DONE, "versions": {"exneat": version, "numpy": "2.4.6"}}
     if curve:
         per_generation = env_steps // len(curve)
         rows = [

@@ -12,7 +12,7 @@ from exneat_cli.analysis.catalogue import Built
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.tables import build_comparison
 from exneat_cli.errors import ExneatError
-from tests.analysis.fake_studies import finish, finish_all, plan_study, run_of
+from tests.analysis.fake_studies import a_study, finish, finish_all, plan_study, run_of
 
 PNG = b"\x89PNG made up"
 
@@ -53,7 +53,7 @@ def a_figure(directory: Path, name: str, title: str = "Learning") -> Built:
 
 
 def a_report(directory: Path) -> Path:
-    study = finish_all(plan_study(directory / "runs"))
+    study = a_study(directory / "runs")
     report = directory / "report"
     artefacts = [a_figure(report, name) for name in ("figure-7.1", "figure-5.1", "figure-4.1", "my own")]
     artefacts.append(Built("table-5.1", "Both", "Means.", artefacts[0].paths[:1], ("variant",), (("NEAT",),)))
@@ -61,43 +61,34 @@ def a_report(directory: Path) -> Path:
     return write_index(report, {"track": study}, artefacts, {"figure-4.2": "no finished run\n  exneat sweep again"})
 
 
-def test_the_page_needs_no_network_no_file_and_no_script(tmp_path: Path) -> None:
+def test_the_page_needs_no_network_no_script_and_no_picture_beside_it_and_links_to_files_by_relative_paths(
+    tmp_path: Path,
+) -> None:
     path = a_report(tmp_path)
     page = Page(path)
     assert "http" not in path.read_text()
-    assert page.values["src"] == ["data:image/png;base64," + base64.b64encode(PNG).decode()] * 4
     assert not {"script", "link", "iframe"} & set(page.tags)
-
-
-def test_chapters_come_in_order_with_tables_before_figures_and_the_contents_lead_to_each(tmp_path: Path) -> None:
-    page = Page(a_report(tmp_path))
-    run = ["what-was-run", "run-track"]
-    chapters = ["chapter-4-figures", "figure-4.1", "chapter-5-tables-and-figures", "table-5.1", "figure-5.1"]
-    others = ["chapter-7-figures", "figure-7.1", "comparisons", "comparison-track", "others", "my-own", "missing"]
-    assert page.values["id"] == [*run, *chapters, *others]
-    assert [link[1:] for link in page.values["href"] if link.startswith("#")] == page.values["id"]
-
-
-def test_links_to_files_are_relative_and_lead_to_files(tmp_path: Path) -> None:
-    path = a_report(tmp_path)
-    links = [link for link in Page(path).values["href"] if not link.startswith("#")]
+    assert page.values["src"] == ["data:image/png;base64," + base64.b64encode(PNG).decode()] * 4
+    links = [link for link in page.values["href"] if not link.startswith("#")]
     assert len(links) == 2 * 4 + 1 + 2
     assert all((path.parent / link.replace("%20", " ")).is_file() for link in links)
 
 
+def test_chapters_come_in_order_with_tables_before_figures_and_the_contents_lead_to_each(tmp_path: Path) -> None:
+    page = Page(a_report(tmp_path))
+    chapters = ["chapter-4-figures", "figure-4.1", "chapter-5-tables-and-figures", "table-5.1", "figure-5.1"]
+    others = ["chapter-7-figures", "figure-7.1", "comparisons", "comparison-track", "others", "my-own", "missing"]
+    assert page.values["id"] == ["what-was-run", "run-track", *chapters, *others]
+    assert [link[1:] for link in page.values["href"] if link.startswith("#")] == page.values["id"]
+
+
 def test_text_from_files_is_never_taken_for_markup(tmp_path: Path) -> None:
     evil = '<script>"&amp;'
-    study = finish_all(
-        plan_study(tmp_path / "runs", variants={"neat": evil, "exneat": "E"}, baselines=(), conditions={"calm": evil})
-    )
+    study = a_study(tmp_path / "runs", variants={"neat": evil, "exneat": "E"}, baselines=(), conditions={"calm": evil})
     report = tmp_path / "report"
-    artefacts = [
-        a_figure(report, "figure-4.1", evil),
-        build_comparison(study, report),
-        Built("others", evil, evil, (), (evil,), ((evil,),)),
-    ]
-    path = write_index(report, {"track": study}, artefacts, {evil: f"{evil}\n{evil}"})
-    page = Page(path)
+    table = Built("others", evil, evil, (), (evil,), ((evil,),))
+    artefacts = [a_figure(report, "figure-4.1", evil), build_comparison(study, report), table]
+    page = Page(write_index(report, {"track": study}, artefacts, {evil: f"{evil}\n{evil}"}))
     assert "script" not in page.tags
     assert page.words.count(evil) >= 12
 
@@ -105,7 +96,7 @@ def test_text_from_files_is_never_taken_for_markup(tmp_path: Path) -> None:
 def test_the_page_says_what_was_run(tmp_path: Path) -> None:
     study = plan_study(tmp_path / "runs")
     finish(run_of(study, "calm", "neat", 0), (0.1, 0.2), env_steps=1_000_000)
-    finish(run_of(study, "calm", "neat", 1), (0.1, 0.2), env_steps=234_567, versions={"exneat": "0.2.0"})
+    finish(run_of(study, "calm", "neat", 1), (0.1, 0.2), env_steps=234_567, version="0.2.0")
     words = Page(write_index(tmp_path / "report", {"track": study}, [], {})).words
     assert "Small networks learn faster." in words
     assert "Budget quick: 2 of 14 runs finished, 1,234,567 environment steps of training, which took 0:03:01" in words

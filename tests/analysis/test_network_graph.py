@@ -8,19 +8,16 @@ from typing import Any
 
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
-from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings, Problem
-from exneat_cli.analysis.network_data import ChampionGraph, Edge, champion_graph, read_champion_graph
+from exneat_cli.analysis.network_data import ChampionGraph, Edge, champion_graph
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import depths, lay_out, natural_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory, write_champion, write_json
-from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import Geometry, Wiring
+from exneat_cli.records import RunDirectory, write_json
 from tests.analysis.fake_champions import a_champion, a_genome, a_module, grid_champion, modular_champion, reads
 from tests.analysis.fake_studies import contents, has_white_edges
 
@@ -178,20 +175,3 @@ def test_a_missing_or_damaged_champion_is_refused_in_one_line(tmp_path: Path) ->
     with pytest.raises(ExneatError, match=r"champion\.json: damaged.*") as raised:
         draw_network(a_run(tmp_path / "run", content))
     assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(("algorithm", "linkage"), [("neat", "none"), ("exneat", "full")])
-def test_the_champions_that_runs_write_can_be_drawn(tmp_path: Path, algorithm: str, linkage: str) -> None:
-    task = AntTask()
-    geometry = Geometry("all" if algorithm == "exneat" else "single")
-    settings, evolution = ALGORITHMS[algorithm](), EvolutionSettings(neat_hidden=4)
-    plan = settings.plan(task, geometry, linkage, Wiring(), evolution)
-    team = settings.start(Problem(plan, evolution, 4, 1, "rank", 0)).ask().teams[0]
-    scores = {"test": {"fitness_mean": 1.0, "fitness_std": 0.0, "episodes": 1}}
-    run = RunDirectory(tmp_path)
-    write_champion(run.champion, Champion(algorithm, {}, task.actuator_names, True, plan, team.genomes, scores))
-    graph = read_champion_graph(run)
-    assert len(graph.links) == (0 if algorithm == "neat" else 4 * (3 * 2 + 3 * 4 + 8) + 4 * 2)
-    dots = [each for each in axes_of(graph).collections if isinstance(each, PathCollection)]
-    nodes = sum(len(module.pins) + module.outputs + module.hidden for module in plan.modules)
-    assert sum(len(each.get_offsets()) for each in dots) == nodes
