@@ -82,22 +82,17 @@ def modular_champion() -> dict[str, Any]:
 
     The back right leg's output is read by nothing.
     """
-    places = {
-        "front_left": (0.2, 0.2),
-        "front_right": (0.2, -0.2),
-        "back_left": (-0.2, 0.2),
-        "back_right": (-0.2, -0.2),
-    }
+    places = [(0.2, 0.2), (0.2, -0.2), (-0.2, 0.2), (-0.2, -0.2)]
     legs = [
         a_module(
-            name,
-            place,
+            f"{'front' if x > 0 else 'back'}_{'left' if y > 0 else 'right'}",
+            (x, y),
             0,
             pins=[reads(2 * k), reads(2 * k + 1), reads(1, (k + 1) % 4, delayed=True)],
             outputs=1,
             hidden=1,
         )
-        for k, (name, place) in enumerate(places.items())
+        for k, (x, y) in enumerate(places)
     ]
     pins = [reads(8), *(reads(0, leg) for leg in range(3))]
     central = a_module("central", (0.0, 0.0), 1, pins=pins, outputs=2, drives=[0, 1])

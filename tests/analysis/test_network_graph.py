@@ -6,27 +6,22 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
-from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings, Problem
 from exneat_cli.analysis.network_data import ChampionGraph, Edge
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import depths, lay_out, natural_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, Genome, RunDirectory, Scores, write_json
-from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import Geometry, Wiring
+from exneat_cli.records import RunDirectory, write_json
 from tests.analysis.fake_champions import (
     a_champion,
     a_genome,
     a_module,
-    a_score,
     graph_of,
     grid_champion,
     modular_champion,
@@ -58,16 +53,12 @@ def laid_out(content: dict[str, Any]) -> Any:
     return lay_out(graph, *natural_size(graph))
 
 
-def test_layers_rise_from_inputs_to_outputs() -> None:
+def test_layers_rise_from_inputs_to_outputs_and_step_aside_for_connections_that_pass_them() -> None:
     _, (places,) = laid_out(grid_champion())
     assert all(places[low][1] < places[high][1] for low, high in pairwise((-1, 2, 3, 0)))
     assert places[-1][1] == places[-2][1]
     assert places[0][1] == places[1][1]
-
-
-def test_a_connection_never_seems_to_end_at_a_node_that_it_only_passes() -> None:
     # The second input feeds output 1 directly, straight through where the faint node 4 would stand.
-    _, (places,) = laid_out(grid_champion())
     assert places[-2][0] == pytest.approx(places[1][0])
     assert abs(places[4][0] - places[1][0]) > 0.08
 
@@ -107,11 +98,6 @@ def test_links_run_between_the_modules_that_the_plan_names_unless_the_node_was_d
     assert prompt == {((leg, 0), (CENTRAL, -2 - leg)) for leg in range(3)}
     content["genomes"][0] = a_genome([0], [(-1, 0, 0.5)])
     assert not any(link.delayed for link in graph_of(content).links)
-
-
-def test_modules_that_share_a_genome_show_the_same_weights() -> None:
-    *legs, _ = graph_of(modular_champion()).edges
-    assert all(set(leg) == {(-1, 1, 0.5), (-2, 1, -0.8), (-3, 1, 0.2), (1, 0, 1.2)} for leg in legs)
 
 
 def test_modules_stand_on_the_page_as_on_the_body() -> None:
@@ -197,28 +183,3 @@ def test_a_missing_or_damaged_champion_is_refused_in_one_line(tmp_path: Path) ->
     with pytest.raises(ExneatError, match=r"champion\.json: damaged.*") as raised:
         draw_network(a_run(tmp_path / "run", content))
     assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(("algorithm", "linkage"), [("neat", "none"), ("exneat", "full")])
-def test_the_champions_that_runs_write_can_be_drawn(tmp_path: Path, algorithm: str, linkage: str) -> None:
-    task = AntTask()
-    geometry = Geometry("all" if algorithm == "exneat" else "single")
-    settings, evolution = ALGORITHMS[algorithm](), EvolutionSettings(neat_hidden=4)
-    plan = settings.plan(task, geometry, linkage, Wiring(), evolution)
-    team = settings.start(Problem(plan, evolution, 4, 1, "rank", 0)).ask().teams[0]
-    run = RunDirectory(tmp_path)
-    champion = Champion(
-        variant=algorithm,
-        task={},
-        actuators=task.actuator_names,
-        feed_forward=True,
-        scores=msgspec.convert({"test": a_score(1.0, 1.0)}, Scores),
-        plan=plan,
-        genomes=tuple(map(Genome.of, team.genomes)),
-    )
-    write_json(run.champion, champion)
-    graph = read_champion_graph(run)
-    assert len(graph.links) == (0 if algorithm == "neat" else 4 * (3 * 2 + 3 * 4 + 8) + 4 * 2)
-    dots = [each for each in axes_of(graph).collections if isinstance(each, PathCollection)]
-    nodes = sum(len(module.pins) + module.outputs + module.hidden for module in plan.modules)
-    assert sum(len(each.get_offsets()) for each in dots) == nodes

@@ -42,13 +42,6 @@ def test_rows_of_other_levels_and_numbers_of_episodes_are_left_out(tmp_path: Pat
     assert len(seen_anew(study).robustness("calm")) == 3 * 2 * 6
 
 
-def test_a_damaged_robustness_table_is_refused_by_its_path(tmp_path: Path) -> None:
-    study = finish_all(plan_study(tmp_path), falling)
-    run_of(study, "calm", "neat", 1).directory.robustness.write_text("variant,level\nneat,0.5\n")
-    with pytest.raises(ExneatError, match=r"calm-neat-s1.robustness\.csv"):
-        study.robustness("calm")
-
-
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
