@@ -17,13 +17,13 @@ from exneat_cli.algorithms import (
     EvolutionSettings,
     Team,
     from_stock,
-    genome_to_data,
     neat_config,
     to_stock,
 )
 from exneat_cli.algorithms.exneat import best_first, separate_ties
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.seeding import stream
+from tests.algorithms.neat.genomes import genes_of
 
 SHAPE = (3, 2, 1)
 XOR = [((0.0, 0.0), 0.0), ((0.0, 1.0), 1.0), ((1.0, 0.0), 1.0), ((1.0, 1.0), 0.0)]
@@ -38,7 +38,7 @@ def coevolution(
 
 
 def fingerprint(genome: ArrayGenome) -> object:
-    return genome_to_data(genome)
+    return genes_of(genome)
 
 
 def synthetic(team: Team) -> float:

@@ -15,12 +15,12 @@ from exneat_cli.algorithms import (
     HallOfFame,
     Snapshot,
     Team,
-    genome_to_data,
     neat_config,
     pack,
     unpack,
 )
 from exneat_cli.seeding import stream
+from tests.algorithms.neat.genomes import genes_of
 
 SHAPE, POPULATION = (3, 2, 2), 20
 
@@ -48,7 +48,7 @@ def go_on(evolution: Coevolution, rng: np.random.Generator) -> list[object]:
     seen: list[object] = []
     for _ in range(3):
         teams = evolution.ask()
-        seen.append([[genome_to_data(genome) for genome in team.genomes] for team in teams])
+        seen.append([[genes_of(genome) for genome in team.genomes] for team in teams])
         seen.append((evolution.species_count, evolution.extinctions))
         evolution.tell(rng.normal(size=len(teams)).tolist())
     return seen
@@ -150,9 +150,7 @@ def test_a_missing_column_is_refused_by_its_name(ant_settings: EvolutionSettings
 
 def test_packed_genomes_come_back_whole(ant_settings: EvolutionSettings) -> None:
     genomes = [team.genomes[0] for team in begun(ant_settings, 1, 5)[0].ask()]
-    assert [genome_to_data(genome) for genome in unpack(pack(genomes))] == [
-        genome_to_data(genome) for genome in genomes
-    ]
+    assert [genes_of(genome) for genome in unpack(pack(genomes))] == [genes_of(genome) for genome in genomes]
 
 
 def test_a_hall_of_fame_goes_on_from_its_entries() -> None:

@@ -29,6 +29,11 @@ NO_ATTRIBUTES = {
 }
 
 
+def genes_of(genome: ArrayGenome) -> tuple[Any, ...]:
+    """Its id and all its genes, to be compared."""
+    return genome.key, genome.nodes.tolist(), genome.connections.tolist()
+
+
 def lively(settings: EvolutionSettings) -> EvolutionSettings:
     """The same with much structural mutation and many flags drawn anew."""
     return replace(

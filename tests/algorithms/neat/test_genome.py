@@ -13,9 +13,17 @@ import neat
 import numpy as np
 import pytest
 
-from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, genome_to_data, to_stock
+from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, to_stock
 from exneat_cli.errors import ConfigError
-from tests.algorithms.neat.genomes import assert_equal, assert_sound, initial_genomes, lively, relatives, seeded_config
+from tests.algorithms.neat.genomes import (
+    assert_equal,
+    assert_sound,
+    genes_of,
+    initial_genomes,
+    lively,
+    relatives,
+    seeded_config,
+)
 
 XOR = [((0.0, 0.0), 0.0), ((0.0, 1.0), 1.0), ((1.0, 0.0), 1.0), ((1.0, 1.0), 0.0)]
 NUMBER = {"max_value": 30.0, "min_value": -30.0, "mutate_power": 0.5, "mutate_rate": 0.7, "replace_rate": 0.1}
@@ -82,7 +90,7 @@ def run(ini: Path, seed: int, generations: int = 10) -> tuple[neat.Population, l
     random.seed(seed)
     population = neat.Population(config_with(ini))
     population.run(evaluate, generations)
-    return population, [genome_to_data(genome) for genome in population.population.values()]
+    return population, [genes_of(genome) for genome in population.population.values()]
 
 
 def test_neat_pythons_population_gets_better_with_array_genomes(ini: Path) -> None:
@@ -131,7 +139,7 @@ def test_a_run_resumed_from_neat_pythons_checkpoint_repeats_itself_and_stays_sou
     for _ in range(2):
         resumed = neat.Checkpointer.restore_checkpoint("at-4")
         resumed.run(evaluate, 4)
-        ends.append([genome_to_data(genome) for genome in resumed.population.values()])
+        ends.append([genes_of(genome) for genome in resumed.population.values()])
         for genome in resumed.population.values():
             assert_sound(genome)
     assert ends[0] == ends[1]

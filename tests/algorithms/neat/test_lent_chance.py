@@ -13,11 +13,12 @@ from dataclasses import replace
 import neat
 import pytest
 
-from exneat_cli.algorithms import EvolutionSettings, genome_to_data
+from exneat_cli.algorithms import EvolutionSettings
 from exneat_cli.algorithms.neat.lent_chance import drawing_names, draws, lent_to_neat
 from exneat_cli.algorithms.neat.settings import neat_config
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.seeding import stream
+from tests.algorithms.neat.genomes import genes_of
 
 NOT_USED = {"neat.checkpoint", "neat.parallel", "neat.population"}
 """Parts of neat-python that draw, and that exneat does without."""
@@ -65,7 +66,7 @@ def test_threads_that_draw_from_pythons_generator_change_nothing(ant_settings: E
         subpopulation = Subpopulation(neat_config(settings, 30, (4, 3, 2)), stream(0, "evolution", 0))
         for generation in range(6):
             subpopulation.advance({key: float((key * 7 + generation) % 11) for key in subpopulation.genomes})
-        return [genome_to_data(subpopulation.in_arrays(key)) for key in subpopulation.genomes]
+        return [genes_of(subpopulation.in_arrays(key)) for key in subpopulation.genomes]
 
     alone = evolved()
     with somebody_who_draws():
