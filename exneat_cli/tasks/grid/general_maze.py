@@ -11,7 +11,6 @@ Source: Zhang (2025), section 3.2.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -19,24 +18,13 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
 from exneat_cli.errors import check_choice, check_real
-from exneat_cli.tasks.grid.maze import (
-    FURTHEST,
-    TERMS,
-    TRACE_COLUMNS,
-    Maze,
-    add_cue_noise,
-    begin,
-    check_maze,
-    goal_of,
-    longest_way,
-    open_maze,
-)
-from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, GridTask
+from exneat_cli.tasks.grid.maze import FURTHEST, Maze, MazeTask, add_cue_noise, begin
+from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS
 from exneat_cli.tasks.task import Simulation
 
 
 @dataclass(frozen=True)
-class GeneralMaze(GridTask):
+class GeneralMaze(MazeTask):
     """Parameters of the general maze.
 
     Attributes:
@@ -58,34 +46,15 @@ class GeneralMaze(GridTask):
     walls_removed: float = 0.0
     fitness: str = "time_and_progress"
 
-    terms: ClassVar[tuple[str, ...]] = TERMS
-    trace_columns: ClassVar[tuple[str, ...]] = TRACE_COLUMNS
-
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, ["general_maze"])
-        check_maze(self.size, self.cue_noise, self.fitness)
+        self._check_maze()
         check_real("task.cues_removed", self.cues_removed, 0.0, 1.0)
         check_real("task.walls_removed", self.walls_removed, 0.0, 1.0)
 
-    @property
-    def longest_episode(self) -> int:
-        """Steps that no episode exceeds."""
-        return longest_way(self.size)
-
     def open(self, *, training: bool) -> Simulation:
         """Open a new maze."""
-        return open_maze(
-            reset,
-            self.size,
-            self.cue_noise,
-            self.fitness,
-            cues_removed=self.cues_removed,
-            walls_removed=self.walls_removed,
-        )
-
-    def targets(self, world: Any) -> list[tuple[int, int]]:
-        """The goal."""
-        return [goal_of(world)]
+        return self._open(reset, cues_removed=self.cues_removed, walls_removed=self.walls_removed)
 
 
 @compiled
@@ -148,39 +117,35 @@ def remove_walls(maze: Maze, rng: Generator) -> None:
     """Open a share of the walls that stand between two cells."""
     if maze.walls_removed == 0.0:  # draws nothing then
         return
-    path, count = maze.path, 0
-    for row in range(1, path.shape[0] - 1):
-        for column in range(1, path.shape[0] - 1):
-            # Between two cells one of the coordinates is odd; where both are even stands a pillar.
-            if path[row, column] == 0 and (row + column) % 2 == 1:
-                maze.queue[count, 0], maze.queue[count, 1] = row, column
-                count += 1
-    for k in range(draw_share(maze.queue, count, maze.walls_removed, rng)):
-        path[maze.queue[k, 0], maze.queue[k, 1]] = 1
+    # A wall between two cells has one odd coordinate; where both are even stands a pillar.
+    walls, size = np.zeros_like(maze.path), maze.path.shape[0]
+    for row in range(1, size - 1):
+        for column in range(1 + row % 2, size - 1, 2):
+            walls[row, column] = 1 - maze.path[row, column]
+    chosen = draw_share(walls, maze.walls_removed, rng)
+    for k in range(chosen.shape[0]):
+        maze.path[chosen[k, 0], chosen[k, 1]] = 1
 
 
 @compiled
 def remove_cues(maze: Maze, rng: Generator) -> None:
-    """Silence both channels on a share of all path tiles."""
+    """Silence both channels on a share of the path tiles."""
     if maze.cues_removed == 0.0:  # draws nothing then
         return
-    path, count = maze.path, 0
-    for row in range(path.shape[0]):
-        for column in range(path.shape[0]):
-            if path[row, column] == 1:
-                maze.queue[count, 0], maze.queue[count, 1] = row, column
-                count += 1
-    for k in range(draw_share(maze.queue, count, maze.cues_removed, rng)):
-        maze.signals[:, maze.queue[k, 0], maze.queue[k, 1]] = 0.0
+    chosen = draw_share(maze.path, maze.cues_removed, rng)
+    for k in range(chosen.shape[0]):
+        maze.signals[:, chosen[k, 0], chosen[k, 1]] = 0.0
 
 
 @compiled
-def draw_share(tiles: NDArray[np.int64], count: int, share: float, rng: Generator) -> int:
-    """Bring a random share of the first `count` tiles, (tiles, 2), to the front; returns how many."""
+def draw_share(eligible: NDArray[np.int64], share: float, rng: Generator) -> NDArray[np.int64]:
+    """(chosen, 2) rows and columns of a random share of the tiles that are not 0 in `eligible`, (N, N)."""
+    tiles = np.argwhere(eligible)
+    count = tiles.shape[0]
     chosen = int(np.rint(share * count))
     # The first steps of a Fisher-Yates shuffle.
     for k in range(chosen):
         other = k + int(rng.integers(0, count - k))
         for axis in range(2):
             tiles[k, axis], tiles[other, axis] = tiles[other, axis], tiles[k, axis]
-    return chosen
+    return tiles[:chosen]

@@ -14,7 +14,7 @@ the sign of the time term reversed: taken literally, a failure would score over 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -22,96 +22,87 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
-from exneat_cli.tasks.grid.world import CHANNELS, COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, move, sense_neighbours
+from exneat_cli.tasks.grid.world import (
+    CHANNELS,
+    COLUMN,
+    COLUMN_STEPS,
+    ROW,
+    ROW_STEPS,
+    STEPS,
+    GridTask,
+    move,
+    sense_neighbours,
+)
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 
 SPARE_STEPS = 2
 """Steps allowed beyond the fastest way (Zhang, 2025, section 3.2.1)."""
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
 """What `task.fitness` may be -> weight of time in the fitness; progress has the rest."""
-TERMS = ("time_reward", "progress_reward")
-TRACE_COLUMNS = ("row", "column", "goal_row", "goal_column")
-"""Of the agent, then of the goal."""
 GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST, START_ROW, START_COLUMN = range(6)
 """Entries of `Maze.goal`: where it is, walking distance from the start, largest distance in the maze, the start."""
 
 
 class Maze(NamedTuple):
-    """A maze of N x N tiles, and what its kind is made from.
+    """A maze of N x N tiles, and what its kind is made from."""
 
-    Attributes:
-        path, signals, agent: see `exneat_cli.tasks.grid.world.GridTask`.
-        distances: (N, N) walking distances to the goal, -1 on walls.
-        queue: (N * N, 2) scratch.
-        goal: see `GOAL_ROW`.
-        time_share: see `TIME_SHARES`.
-        cue_noise: sd of the noise on the cues of path tiles.
-        gap: silent tiles before the goal of a track.
-        cues_removed, walls_removed: shares of a general maze's cues and inner walls.
-    """
+    path: NDArray[np.int64]  #: (N, N), see `exneat_cli.tasks.grid.world.GridTask`
+    signals: NDArray[np.float64]  #: (2, N, N), see there
+    agent: NDArray[np.int64]  #: (3,), see there
+    distances: NDArray[np.int64]  #: (N, N) walking distances to the goal, -1 on walls
+    goal: NDArray[np.int64]  #: (6,), see `GOAL_ROW`
+    time_share: float  #: see `TIME_SHARES`
+    cue_noise: float  #: sd of the noise on the cues of path tiles
+    gap: int  #: silent tiles before the goal of a track
+    cues_removed: float  #: share of the path tiles of a general maze
+    walls_removed: float  #: share of the walls between its cells
 
-    path: NDArray[np.int64]
-    signals: NDArray[np.float64]
-    agent: NDArray[np.int64]
-    distances: NDArray[np.int64]
-    queue: NDArray[np.int64]
-    goal: NDArray[np.int64]
-    time_share: float
+
+class MazeTask(GridTask):
+    """A maze with parameters that both kinds have; the dataclasses that derive from it declare them."""
+
+    size: int
     cue_noise: float
-    gap: int
-    cues_removed: float
-    walls_removed: float
+    fitness: str
 
+    terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
+    trace_columns: ClassVar[tuple[str, ...]] = ("row", "column", "goal_row", "goal_column")
+    """Row and column of the agent, then of the goal."""
 
-def check_maze(size: int, cue_noise: float, fitness: str) -> None:
-    """Refuse what no maze can have.
+    @property
+    def longest_episode(self) -> int:
+        """No way leads over more than all tiles."""
+        return self.size**2 + SPARE_STEPS
 
-    Raises:
-        ConfigError: a value is out of range.
-    """
-    check_whole("task.size", size, 5, 99)
-    if size % 2 == 0:
-        raise ConfigError("task.size", "an odd number of at least 5", size, "walls stand on the even tiles")
-    check_real("task.cue_noise", cue_noise, 0.0)
-    check_choice("task.fitness", fitness, list(TIME_SHARES))
+    def targets(self, world: Any) -> list[tuple[int, int]]:
+        """The goal."""
+        return [(int(world.goal[GOAL_ROW]), int(world.goal[GOAL_COLUMN]))]
 
+    def _check_maze(self) -> None:
+        check_whole("task.size", self.size, 5, 99)
+        if self.size % 2 == 0:
+            raise ConfigError("task.size", "an odd number of at least 5", self.size, "walls stand on the even tiles")
+        check_real("task.cue_noise", self.cue_noise, 0.0)
+        check_choice("task.fitness", self.fitness, list(TIME_SHARES))
 
-def open_maze(
-    reset: Callable[[Maze, Generator], None],
-    size: int,
-    cue_noise: float,
-    fitness: str,
-    *,
-    gap: int = 0,
-    cues_removed: float = 0.0,
-    walls_removed: float = 0.0,
-) -> Simulation:
-    """Open a maze of size x size tiles that `reset` draws; for the rest see `Maze`."""
-    maze = Maze(
-        path=np.zeros((size, size), np.int64),
-        signals=np.zeros((CHANNELS, size, size)),
-        agent=np.zeros(3, np.int64),
-        distances=np.zeros((size, size), np.int64),
-        queue=np.zeros((size * size, 2), np.int64),
-        goal=np.zeros(6, np.int64),
-        time_share=TIME_SHARES[fitness],
-        # A whole number would be another type to the compiler, and compiled apart.
-        cue_noise=float(cue_noise),
-        gap=gap,
-        cues_removed=float(cues_removed),
-        walls_removed=float(walls_removed),
-    )
-    return Simulation(maze, reset, rewind, observe, step, locate)
-
-
-def longest_way(size: int) -> int:
-    """Steps that no episode exceeds: no way leads over more than all tiles."""
-    return size**2 + SPARE_STEPS
-
-
-def goal_of(maze: Maze) -> tuple[int, int]:
-    """Row and column of the goal."""
-    return int(maze.goal[GOAL_ROW]), int(maze.goal[GOAL_COLUMN])
+    def _open(
+        self, reset: Callable[..., Any], *, gap: int = 0, cues_removed: float = 0.0, walls_removed: float = 0.0
+    ) -> Simulation:
+        tiles = (self.size, self.size)
+        maze = Maze(
+            path=np.zeros(tiles, np.int64),
+            signals=np.zeros((CHANNELS, *tiles)),
+            agent=np.zeros(3, np.int64),
+            distances=np.zeros(tiles, np.int64),
+            goal=np.zeros(6, np.int64),
+            time_share=TIME_SHARES[self.fitness],
+            # A whole number would be another type to the compiler, and compiled apart.
+            cue_noise=float(self.cue_noise),
+            gap=gap,
+            cues_removed=float(cues_removed),
+            walls_removed=float(walls_removed),
+        )
+        return Simulation(maze, reset, rewind, observe, step, locate)
 
 
 @compiled
@@ -119,31 +110,24 @@ def begin(maze: Maze, start: tuple[int, int], goal: tuple[int, int]) -> None:
     """Set start and goal, (row, column) of path tiles, measure all ways, and put the agent to the start."""
     maze.goal[START_ROW], maze.goal[START_COLUMN] = start
     maze.goal[GOAL_ROW], maze.goal[GOAL_COLUMN] = goal
-    maze.goal[FURTHEST] = measure_distances(maze.path, goal, maze.distances, maze.queue)
+    maze.goal[FURTHEST] = measure_distances(maze.path, goal, maze.distances)
     maze.goal[FASTEST] = maze.distances[start]
     rewind(maze)
 
 
 @compiled
-def measure_distances(
-    path: NDArray[np.int64], goal: tuple[int, int], distances: NDArray[np.int64], queue: NDArray[np.int64]
-) -> int:
-    """Write the walking distance of every path tile to `goal`, -1 where there is no way.
-
-    Args:
-        path: (N, N).
-        goal: row and column of a path tile.
-        distances: (N, N), overwritten.
-        queue: (N * N, 2), scratch.
+def measure_distances(path: NDArray[np.int64], goal: tuple[int, int], distances: NDArray[np.int64]) -> int:
+    """Write the walking distance of every tile of `path` to `goal` into `distances`, both (N, N); -1 without a way.
 
     Returns:
         The largest distance.
     """
     # Breadth first: tiles leave the queue in the order of their distance, so the last one is the furthest.
-    distances[:] = -1
-    distances[goal] = 0
+    queue = np.empty((path.size, 2), np.int64)
     queue[0, 0], queue[0, 1] = goal
     head, tail = 0, 1
+    distances[:] = -1
+    distances[goal] = 0
     furthest = 0
     while head < tail:
         row, column = queue[head, 0], queue[head, 1]
@@ -205,7 +189,7 @@ def step(maze: Maze, action: NDArray[np.float64], terms: NDArray[np.float64]) ->
 
 @compiled
 def locate(maze: Maze, row: NDArray[np.float64]) -> None:
-    """Write row and column of the agent, then of the goal, in the order of `TRACE_COLUMNS`."""
+    """Write row and column of the agent, then of the goal."""
     row[0] = maze.agent[ROW]
     row[1] = maze.agent[COLUMN]
     row[2] = maze.goal[GOAL_ROW]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
-from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field, draw_prey, new_field
+from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field, bell, draw_prey
 from exneat_cli.tasks.grid.world import CHANNELS, COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, GridTask, move
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 
@@ -62,10 +62,11 @@ class Foraging(GridTask):
     patch_width: int = 5
 
     terms: ClassVar[tuple[str, ...]] = ("caught",)
-    emits_both: ClassVar[bool] = False
+    channels: ClassVar[int] = 1
+    """On which each prey emits."""
 
     def __post_init__(self) -> None:
-        check_choice("task.name", self.name, ["hunting" if self.emits_both else "foraging"])
+        check_choice("task.name", self.name, ["foraging" if self.channels == 1 else "hunting"])
         check_whole("task.size", self.size, 3, 99)
         check_whole("task.n_prey", self.n_prey, 1, self.size**2 - 1)
         check_whole("task.steps", self.steps, 1, 1_000_000)
@@ -77,7 +78,7 @@ class Foraging(GridTask):
         self._check_memory()
 
     def _check_memory(self) -> None:
-        per_prey = (self.size + 2) ** 2 * (CHANNELS if self.emits_both else 1)
+        per_prey = (self.size + 2) ** 2 * self.channels
         most_prey, most_steps = MOST_CUES // per_prey, MOST_CUES // (per_prey * self.n_prey)
         fix = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
         if self.n_prey > most_prey:
@@ -101,16 +102,22 @@ class Foraging(GridTask):
         return self._open(motion=0.0, levy=False)
 
     def _open(self, *, motion: float, levy: bool) -> Simulation:
-        field = new_field(
-            self.size,
-            self.n_prey,
-            self.patch_width,
-            emission=self.p_e,
-            decay=self.p_c,
-            motion=motion,
+        tiles, prey = (self.size + 2, self.size + 2), self.n_prey
+        field = Field(
+            path=np.zeros(tiles, np.int64),
+            agent=np.zeros(3, np.int64),
+            prey=np.zeros((prey, 3), np.int64),
+            start=np.zeros((prey, 2), np.int64),
+            places=np.zeros((self.steps, prey, 2), np.int64),
+            cues=np.zeros((self.steps, *tiles, prey * self.channels)),
+            last_free=np.zeros(prey, np.int64),
+            strength=np.zeros(prey),
+            patch=bell(self.patch_width),
+            channels=self.channels,
+            emission=float(self.p_e),
+            keep=1.0 - self.p_c,
+            motion=float(motion),
             levy=levy,
-            both_channels=self.emits_both,
-            max_steps=self.steps,
         )
         return Simulation(field, reset, rewind, observe, step, locate)
 
@@ -142,7 +149,7 @@ class Hunting(Foraging):
     p_m: float = 0.5
     motion: str = "levy"
 
-    emits_both: ClassVar[bool] = True
+    channels: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -200,27 +207,26 @@ def advance(field: Field) -> int:
 @compiled_lean
 def observe(field: Field, observation: NDArray[np.float64]) -> None:
     """Write the cue field on the four neighbours: per channel the sum over emitters."""
-    agent, cues, emitters = field.agent, field.cues, field.emitters
+    agent, cues = field.agent, field.cues
     last_free, strength = field.last_free, field.strength
     row, column = agent[ROW], agent[COLUMN]
     observation[:] = 0.0
-    for emitter in range(emitters.size):
-        k = emitters[emitter]
+    for k in range(last_free.size):
         t, share = last_free[k], strength[k]
-        channel = 0 if emitter < field.first_of_second else 1
-        for side in range(4):
-            cue = cues[t, row + ROW_STEPS[side], column + COLUMN_STEPS[side], emitter]
-            observation[CHANNELS * side + channel] += share * cue
+        for emitter in range(k * field.channels, (k + 1) * field.channels):
+            channel = emitter % CHANNELS
+            for side in range(4):
+                cue = cues[t, row + ROW_STEPS[side], column + COLUMN_STEPS[side], emitter]
+                observation[CHANNELS * side + channel] += share * cue
 
 
 @compiled
 def paint(field: Field, signals: NDArray[np.float64]) -> None:
     """Write the whole cue field as it is now into `signals`, (2, N, N)."""
     signals[:] = 0.0
-    for emitter in range(field.emitters.size):
-        k = field.emitters[emitter]
-        channel = 0 if emitter < field.first_of_second else 1
-        signals[channel] += field.strength[k] * field.cues[field.last_free[k], :, :, emitter]
+    for emitter in range(field.cues.shape[3]):
+        k = emitter // field.channels
+        signals[emitter % CHANNELS] += field.strength[k] * field.cues[field.last_free[k], :, :, emitter]
 
 
 @compiled_lean

@@ -11,24 +11,12 @@ Source: Zhang (2025), section 3.2.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 from numpy.random import Generator
 
 from exneat_cli.compiling import compiled
 from exneat_cli.errors import check_choice, check_whole
-from exneat_cli.tasks.grid.maze import (
-    TERMS,
-    TRACE_COLUMNS,
-    Maze,
-    add_cue_noise,
-    begin,
-    check_maze,
-    goal_of,
-    longest_way,
-    open_maze,
-)
-from exneat_cli.tasks.grid.world import GridTask
+from exneat_cli.tasks.grid.maze import Maze, MazeTask, add_cue_noise, begin
 from exneat_cli.tasks.task import Simulation
 
 LEAST_CUE, MOST_CUE = 0.1, 0.5
@@ -36,7 +24,7 @@ LEAST_CUE, MOST_CUE = 0.1, 0.5
 
 
 @dataclass(frozen=True)
-class TrackMaze(GridTask):
+class TrackMaze(MazeTask):
     """Parameters of the track.
 
     Attributes:
@@ -56,26 +44,14 @@ class TrackMaze(GridTask):
     cue_noise: float = 0.0
     fitness: str = "time_and_progress"
 
-    terms: ClassVar[tuple[str, ...]] = TERMS
-    trace_columns: ClassVar[tuple[str, ...]] = TRACE_COLUMNS
-
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, ["track_maze"])
-        check_maze(self.size, self.cue_noise, self.fitness)
+        self._check_maze()
         check_whole("task.gap", self.gap, 0, (self.size - 3) // 2)
-
-    @property
-    def longest_episode(self) -> int:
-        """Steps that no episode exceeds."""
-        return longest_way(self.size)
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new track."""
-        return open_maze(reset, self.size, self.cue_noise, self.fitness, gap=self.gap)
-
-    def targets(self, world: Any) -> list[tuple[int, int]]:
-        """The goal."""
-        return [goal_of(world)]
+        return self._open(reset, gap=self.gap)
 
 
 @compiled

@@ -21,53 +21,35 @@ STEPS, STUCK_STEPS, WARNINGS = range(3)
 
 
 class AntWorld(NamedTuple):
-    """MuJoCo's memory as NumPy views, and the rules of an episode.
+    """MuJoCo's memory as NumPy views, and the rules of an episode."""
 
-    Attributes:
-        model, data: addresses of the C structures.
-        qpos, qvel, ctrl, xpos, cfrc_ext: views of `mjData`; shapes (nq,), (nv,), (nu,), (nbody, 3), (nbody, 6).
-        warnings: view of MuJoCo's warning counters.
-        initial_qpos, initial_qvel: the pose that a reset perturbs.
-        start_qpos, start_qvel: what it made of it.
-        trunk: body whose height and x position count.
-        substeps, control_period: physics steps per control step, and its length in seconds.
-        reset_scale: half-width of the uniform noise on positions (rad, m), sd of that on velocities.
-        lowest, highest: healthy heights of the trunk in metres.
-        force_limit: contact forces are clipped to [-force_limit, force_limit].
-        healthy_reward, control_weight, contact_weight: weights of the reward terms.
-        max_steps: control steps after which an episode ends.
-        progress, patience: an episode ends after `patience` steps (0: never) without `progress` metres.
-        clock: see `STEPS`, `STUCK_STEPS` and `WARNINGS`.
-        mark: x position (m) that progress is measured from, in an array of one.
-    """
-
-    model: int
-    data: int
-    qpos: NDArray[np.float64]
-    qvel: NDArray[np.float64]
-    ctrl: NDArray[np.float64]
-    xpos: NDArray[np.float64]
-    cfrc_ext: NDArray[np.float64]
-    warnings: NDArray[np.int32]
-    initial_qpos: NDArray[np.float64]
+    model: int  #: address of the C structure `mjModel`
+    data: int  #: address of `mjData`, of which the next six are views
+    qpos: NDArray[np.float64]  #: (nq,), m, rad and quaternions
+    qvel: NDArray[np.float64]  #: (nv,), m/s and rad/s
+    ctrl: NDArray[np.float64]  #: (nu,)
+    xpos: NDArray[np.float64]  #: (nbody, 3), m
+    cfrc_ext: NDArray[np.float64]  #: (nbody, 6), N m and N
+    warnings: NDArray[np.int32]  #: counters
+    initial_qpos: NDArray[np.float64]  #: the pose that a reset disturbs
     initial_qvel: NDArray[np.float64]
-    start_qpos: NDArray[np.float64]
+    start_qpos: NDArray[np.float64]  #: what the reset made of it
     start_qvel: NDArray[np.float64]
-    trunk: int
-    substeps: int
-    control_period: float
-    reset_scale: float
-    lowest: float
+    trunk: int  #: body whose height and x position count
+    substeps: int  #: physics steps per control step
+    control_period: float  #: seconds per control step
+    reset_scale: float  #: half-width of the uniform noise on positions (rad, m), sd of that on velocities
+    lowest: float  #: healthy height of the trunk in m
     highest: float
-    force_limit: float
-    healthy_reward: float
+    force_limit: float  #: contact forces are clipped to [-force_limit, force_limit]
+    healthy_reward: float  #: weights of the reward terms
     control_weight: float
     contact_weight: float
-    max_steps: int
-    progress: float
-    patience: int
-    clock: NDArray[np.int64]
-    mark: NDArray[np.float64]
+    max_steps: int  #: control steps after which an episode ends
+    progress: float  #: m without which an episode ends after `patience` steps
+    patience: int  #: 0: never
+    clock: NDArray[np.int64]  #: (3,), see `STEPS`, `STUCK_STEPS` and `WARNINGS`
+    mark: NDArray[np.float64]  #: (1,), x in m that progress is measured from
 
 
 @compiled
