@@ -52,12 +52,14 @@ def generation(search: Search, problem: Problem, number: int) -> list[Any]:
     seen: list[Any] = []
     for turn in range(100):
         trials = search.ask()
+        assert trials.episodes >= 1
+        assert all(len(team.genomes) == len(problem.plan.subpopulation_shapes) for team in trials.teams)
         seen += [(team.ids, genes_of(team)) for team in trials.teams]
         if search.tell(results(problem, len(trials.teams), 100 * number + turn)):
-            break
-    else:
-        raise AssertionError("the generation has no end")
-    return [*seen, *((c.fitness, c.generation, genes_of(c.team)) for c in search.candidates()), search.columns()]
+            assert all(math.isfinite(value) for value in search.columns().values())
+            seen += [(c.fitness, c.generation, genes_of(c.team)) for c in search.candidates()]
+            return [*seen, search.columns()]
+    raise AssertionError("the generation has no end")
 
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
@@ -67,13 +69,6 @@ def test_an_algorithm_goes_by_its_name_and_is_frozen(name: str) -> None:
         MADE[name].name = "other"
     with pytest.raises(ConfigError, match=r"^algorithm\.name: expected one of"):
         ALGORITHMS[name](name="other")  # type: ignore[call-arg]
-
-
-def test_teams_have_a_genome_of_each_subpopulation_and_episodes_to_run(algorithm: Algorithm, problem: Problem) -> None:
-    trials = algorithm.start(problem).ask()
-    assert len(trials.teams) >= 1
-    assert trials.episodes >= 1
-    assert all(len(team.genomes) == len(problem.plan.subpopulation_shapes) for team in trials.teams)
 
 
 def test_ask_and_tell_are_refused_out_of_turn_and_bad_results_at_once(algorithm: Algorithm, problem: Problem) -> None:
@@ -98,8 +93,13 @@ def test_a_restored_search_goes_on_to_the_byte_and_taking_its_state_changes_noth
     algorithm: Algorithm, problem: Problem
 ) -> None:
     undisturbed, saved = algorithm.start(problem), algorithm.start(problem)
+    elsewhere = generation(algorithm.start(dataclasses.replace(problem, seed=6)), problem, 0)
+    names = set()
     for number in range(3):
-        assert generation(undisturbed, problem, number) == generation(saved, problem, number)
+        expected = generation(undisturbed, problem, number)
+        assert generation(saved, problem, number) == expected != elsewhere
+        names.add(tuple(saved.columns()))
+    assert len(names) == 1
     # A state is data: what a checkpoint makes of it is as good.
     state, file = saved.state(), io.BytesIO()
     np.savez(file, **state.arrays)
@@ -110,12 +110,6 @@ def test_a_restored_search_goes_on_to_the_byte_and_taking_its_state_changes_noth
         expected = generation(undisturbed, problem, number)
         assert generation(saved, problem, number) == expected
         assert generation(restored, problem, number) == expected
-
-
-def test_another_seed_searches_elsewhere(algorithm: Algorithm, problem: Problem) -> None:
-    other = dataclasses.replace(problem, seed=6)
-    first, again, elsewhere = (generation(algorithm.start(p), p, 0) for p in (problem, problem, other))
-    assert first == again != elsewhere
 
 
 def test_candidates_never_failed_and_come_best_first(algorithm: Algorithm, problem: Problem) -> None:
@@ -138,15 +132,6 @@ def test_candidates_never_failed_and_come_best_first(algorithm: Algorithm, probl
             assert candidate.fitness <= 0.5
             assert candidate.generation < number or genes_of(candidate.team) not in failed
         assert [c.fitness for c in candidates] == sorted((c.fitness for c in candidates), reverse=True)
-
-
-def test_columns_keep_their_names_and_are_finite(algorithm: Algorithm, problem: Problem) -> None:
-    search, names = algorithm.start(problem), set()
-    for number in range(3):
-        generation(search, problem, number)
-        names.add(tuple(search.columns()))
-        assert all(math.isfinite(value) for value in search.columns().values())
-    assert len(names) == 1
 
 
 def fitting(name: str, task: str) -> RunSettings | None:
