@@ -81,8 +81,11 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
     if directory is not None and _is_all_ours(function):
         # numba has no argument for the place of a cache; this is its NUMBA_CACHE_DIR, and it stays for the process.
         config.CACHE_DIR = str(directory)
-        with contextlib.suppress(RuntimeError):  # numba cannot write there, although there is such a directory
-            dispatcher._cache = _Cache(function)
+        with contextlib.suppress(RuntimeError):  # nothing can be written, although there is such a directory
+            cache = _Cache(function)
+            # On a full disk numba turns to another place, whose name tells nothing of what was compiled.
+            if directory in Path(cache.cache_path).parents:
+                dispatcher._cache = cache
     return dispatcher  # type: ignore[no-any-return]
 
 
