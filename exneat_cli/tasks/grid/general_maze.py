@@ -63,10 +63,15 @@ def reset(maze: Maze, rng: Generator) -> None:
     size = maze.path.shape[0]
     carve(maze.path, rng)
     remove_walls(maze, rng)
-    # The start is any corner but the goal's.
+    # Corners 0 and 1 are the upper ones, 2 and 3 the lower ones; the start is any but the goal's.
     goal = int(rng.integers(0, 4))
     start = (goal + 1 + int(rng.integers(0, 3))) % 4
-    begin(maze, corner(start, size), corner(goal, size))
+    far = size - 3  # from one corner to the next
+    begin(
+        maze,
+        start=(1 + start // 2 * far, 1 + start % 2 * far),
+        goal=(1 + goal // 2 * far, 1 + goal % 2 * far),
+    )
     furthest = maze.goal[FURTHEST]
     maze.signals[:] = 0.0
     for row in range(size):
@@ -102,14 +107,6 @@ def carve(path: NDArray[np.int64], rng: Generator) -> None:
             path[(row + next_row) // 2, (column + next_column) // 2] = 1
             left -= 1
         row, column = next_row, next_column
-
-
-@compiled
-def corner(index: int, size: int) -> tuple[int, int]:
-    """Row and column of corner 0 to 3: the upper left and right one, then the lower ones."""
-    row = 1 if index < 2 else size - 2
-    column = 1 if index % 2 == 0 else size - 2
-    return row, column
 
 
 @compiled

@@ -123,9 +123,11 @@ class Foraging(GridTask):
 
     def tiles(self, world: Field) -> NDArray[np.float64]:
         """(N, N, 3) path (1 or 0) and both channels of the cue field as the agent sensed it last."""
-        signals = np.zeros((CHANNELS, *world.path.shape))
-        paint(world, signals)
-        return np.stack([world.path, *signals], axis=2)
+        tiles = np.stack([world.path, *np.zeros((CHANNELS, *world.path.shape))], axis=2)
+        for emitter in range(world.cues.shape[3]):
+            k = emitter // self.channels
+            tiles[..., 1 + emitter % CHANNELS] += world.strength[k] * world.cues[world.last_free[k], ..., emitter]
+        return tiles
 
     def targets(self, world: Field) -> list[tuple[int, int]]:
         """The prey that are free."""
@@ -218,15 +220,6 @@ def observe(field: Field, observation: NDArray[np.float64]) -> None:
             for side in range(4):
                 cue = cues[t, row + ROW_STEPS[side], column + COLUMN_STEPS[side], emitter]
                 observation[CHANNELS * side + channel] += share * cue
-
-
-@compiled
-def paint(field: Field, signals: NDArray[np.float64]) -> None:
-    """Write the whole cue field as it is now into `signals`, (2, N, N)."""
-    signals[:] = 0.0
-    for emitter in range(field.cues.shape[3]):
-        k = emitter // field.channels
-        signals[emitter % CHANNELS] += field.strength[k] * field.cues[field.last_free[k], :, :, emitter]
 
 
 @compiled_lean

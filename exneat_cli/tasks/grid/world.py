@@ -34,7 +34,6 @@ from exneat_cli.tasks.task import Part, Task
 CHANNELS = 2
 STAY = 4
 MOVES = ("left", "right", "up", "down", "stay")
-POSITIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)}
 ROW_STEPS = (0, 0, -1, 1, 0)
 COLUMN_STEPS = (-1, 1, 0, 0, 0)
 """Change of row and column for each move; rows grow downwards."""
@@ -55,14 +54,13 @@ class GridTask(Task):
     observation_limits: ClassVar[tuple[float, float]] = (0.0, 1.0)
     observation_size: ClassVar[int] = 4 * CHANNELS
     actuator_names: ClassVar[tuple[str, ...]] = MOVES
-
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """Left, right, up and down, with two channels and the value of moving there."""
-        return tuple(
-            Part(name, (CHANNELS * k, CHANNELS * k + 1), (k,), position)
-            for k, (name, position) in enumerate(POSITIONS.items())
-        )
+    parts: ClassVar[tuple[Part, ...]] = (
+        Part("left", sensors=(0, 1), actuators=(0,), position=(-1.0, 0.0)),
+        Part("right", sensors=(2, 3), actuators=(1,), position=(1.0, 0.0)),
+        Part("up", sensors=(4, 5), actuators=(2,), position=(0.0, 1.0)),
+        Part("down", sensors=(6, 7), actuators=(3,), position=(0.0, -1.0)),
+    )
+    """Each senses two channels and gives the value of moving there."""
 
     @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

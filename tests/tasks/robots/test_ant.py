@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 
-from exneat_cli.errors import ConfigError
+from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.tasks import ENDED, FAILED, RUNNING, AntTask, Simulation
+from exneat_cli.tasks.robots import mujoco_library
 
 STEPS = 1000
 GYMNASIUM_TERMS = ("reward_forward", "reward_survive", "reward_ctrl", "reward_contact")
@@ -153,3 +156,18 @@ def test_a_leg_senses_its_own_joints_and_bodies_and_no_others(gymnasium_ant: Any
 def test_parameters_out_of_range_are_refused_by_their_key(key: str, value: Any) -> None:
     with pytest.raises(ConfigError, match=f"task.{key}"):
         AntTask(**{key: value})
+
+
+def test_a_missing_or_broken_library_of_mujoco_is_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mujoco, "__file__", str(tmp_path / "__init__.py"))
+    with pytest.raises(ExneatError, match="expected its library in"):
+        mujoco_library.load_library.__wrapped__()
+    (tmp_path / "libmujoco.so.9").write_bytes(b"no library")
+    with pytest.raises(ExneatError, match=r"libmujoco\.so\.9 could not be loaded"):
+        mujoco_library.load_library.__wrapped__()
+    monkeypatch.undo()
+    monkeypatch.setattr(mujoco_library, "_SYMBOLS", ("mj_fly",))
+    with pytest.raises(ExneatError, match="has no mj_fly"):
+        mujoco_library.load_library.__wrapped__()
