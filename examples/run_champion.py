@@ -27,10 +27,10 @@ class Champion:
         self.sensed, self.before, self.values = sensed, self.values, {}
         action = np.zeros(self.plan["action_size"])
         for m, k in self.nodes:  # node k is output k where the module has so many, and drives nothing else
-            action[self.plan["modules"][m]["drives"][k : k + 1]] = self.value(m, k, old=False)
+            action[self.plan["modules"][m]["drives"][k : k + 1]] = self.read(m, k, old=False)
         return action
 
-    def value(self, m, k, old):
+    def read(self, m, k, old):
         """What node k of module m, or its pin -1 - k, holds now, or if `old` held at the end of the last step."""
         if k < 0:
             pin = self.plan["modules"][m]["pins"][-1 - k]
@@ -38,10 +38,8 @@ class Champion:
                 return self.sensed[pin["index"]]
             m, k, old = pin["module"], pin["index"], old or pin["delayed"]
         if not old and (m, k) in self.nodes and (m, k) not in self.values:
-            node, edges = self.nodes[m, k]
-            fed = [
-                c["weight"] * self.value(m, c["from"], self.recurrent) for c in edges if c["to"] == k and c["enabled"]
-            ]
+            node, arcs = self.nodes[m, k]
+            fed = [c["weight"] * self.read(m, c["from"], self.recurrent) for c in arcs if c["to"] == k and c["enabled"]]
             z = node["bias"] + node["response"] * sum(fed)
             self.values[m, k] = ACTIVATIONS[node["activation"]](z) if fed or not self.recurrent else 0.0
         return (self.before if old else self.values).get((m, k), 0.0)
