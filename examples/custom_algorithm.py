@@ -1,18 +1,15 @@
 """An algorithm of one's own: a (1 + lambda) evolution strategy that changes nothing but weights.
 
-    python examples/custom_algorithm.py task=track_maze budget=quick algorithm.sigma=0.3
+    python examples/custom_algorithm.py train --config-dir examples/conf task=track_maze algorithm=hill_climber
 
-trains with it as `exneat train` would; conf/algorithm/hill_climber.yaml beside this file holds its settings.
-
+This file is the program exneat with one algorithm more; conf/algorithm/hill_climber.yaml beside it holds its settings.
 Source: Rechenberg, "Evolutionsstrategie", 1973, without adaptation of the step size.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -123,5 +120,4 @@ class Climb(Search):
 ALGORITHMS["hill_climber"] = HillClimber
 
 if __name__ == "__main__":
-    conf = str(Path(__file__).parent / "conf")
-    raise SystemExit(main(["train", "--config-dir", conf, "algorithm=hill_climber", *sys.argv[1:]]))
+    raise SystemExit(main())

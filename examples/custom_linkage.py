@@ -1,15 +1,13 @@
 """A linkage of one's own: in a ring, each module reads the outputs of its neighbour.
 
-    python examples/custom_linkage.py task=track_maze budget=quick
+    python examples/custom_linkage.py train --config-dir examples/conf task=track_maze linkage=ring
 
-trains with it as `exneat train` would; conf/linkage/ring.yaml beside this file is what `linkage=ring` finds.
+This file is the program exneat with one linkage more; conf/linkage/ring.yaml beside it is what `linkage=ring` finds.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from exneat_cli.main import main
 from exneat_cli.tasks import Part
@@ -25,5 +23,4 @@ def ring(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
 LINKAGES["ring"] = ring
 
 if __name__ == "__main__":
-    conf = str(Path(__file__).parent / "conf")
-    raise SystemExit(main(["train", "--config-dir", conf, "linkage=ring", *sys.argv[1:]]))
+    raise SystemExit(main())

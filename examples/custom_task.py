@@ -1,17 +1,13 @@
 """A task of one's own: a corridor with a lamp at one end, which two modules learn to walk to.
 
-    python examples/custom_task.py budget=quick
+    python examples/custom_task.py train --config-dir examples/conf task=corridor
 
-trains it as `exneat train` would; conf/task/corridor.yaml beside this file holds its settings. The functions of the
-world are plain Python here. Decorated with `exneat_cli.compiling.compiled_lean` (and without ``compiled=False``) they
-become part of the compiled loop.
+This file is the program exneat with one task more; conf/task/corridor.yaml beside it holds the task's settings.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -108,5 +104,4 @@ class Corridor(Task):
 TASKS["corridor"] = Corridor
 
 if __name__ == "__main__":
-    conf = str(Path(__file__).parent / "conf")
-    raise SystemExit(main(["train", "--config-dir", conf, "task=corridor", *sys.argv[1:]]))
+    raise SystemExit(main())

@@ -1,12 +1,11 @@
 """Compare one network with four modules, from Python: the example of the README."""
 
+from exneat_cli.algorithms import NEAT, ExNEAT
 from exneat_cli.runs import RunSettings, train
-from exneat_cli.tasks import TrackMaze
-from exneat_cli.wiring import Geometry
+from exneat_cli.tasks import Foraging
 
-task = TrackMaze(size=17, gap=2)
-network = RunSettings(task=task, algorithm="neat", generations=10, episodes=10)
-modules = RunSettings(task=task, algorithm="exneat", geometry=Geometry("single"), generations=10, episodes=10)
-for settings in (network, modules):
+for algorithm in (NEAT(), ExNEAT()):
+    settings = RunSettings(task=Foraging(size=7), algorithm=algorithm, generations=10, episodes=10)
     finished = train(settings)
-    print(finished.directory.path, finished.summary, sep="\n")
+    print(finished.directory.path)
+    print(finished.summary)
