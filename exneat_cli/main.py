@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import importlib
 import os
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import heeding, listen, listening, stop_listening, tell_how_to_go_on
+from exneat_cli.interruption import listen, listening, signal_heard
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -34,6 +35,7 @@ USAGE = {
 }
 """What --help prints for the commands that Hydra does not answer for."""
 
+_RESUMABLE = "exneat: interrupted; run the same command again to resume (a single exneat train also needs resume=true)"
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
 
@@ -65,7 +67,8 @@ def program() -> int:
     """What the installed program calls: as `main`, but a late signal changes nothing any more."""
     listen()
     code = _answer(sys.argv[1:])
-    stop_listening()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     _drop_what_nobody_reads()
     return code
 
@@ -84,13 +87,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _answer(arguments: Sequence[str]) -> int:
     try:
-        return _answer_unless_interrupted(arguments)
-    except KeyboardInterrupt as interrupt:
-        tell_how_to_go_on()
-        return 128 + getattr(interrupt, "number", signal.SIGINT)
+        return _run(arguments)
+    except (Exception, KeyboardInterrupt) as error:
+        if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
+            with contextlib.suppress(OSError, ValueError):  # nobody reads
+                print(_RESUMABLE, file=sys.stderr, flush=True)
+            return 128 + (signal_heard() or signal.SIGINT)
+        if isinstance(error, BrokenPipeError):
+            return 0
+        message = _expected(error)
+        if message is None:
+            raise
+        print(f"exneat: {_printable(message)}", file=sys.stderr)
+        return 2
 
 
-def _answer_unless_interrupted(arguments: Sequence[str]) -> int:
+def _expected(error: BaseException) -> str | None:
+    """What to say of an error that is no fault of the program's; None of others."""
+    if isinstance(error, ExneatError):
+        return str(error)
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        where = error.filename or "temporary files or the program's own output"
+        return f"{where}: {error.strerror}; check the disk, output= and TMPDIR"
+    return None
+
+
+def _run(arguments: Sequence[str]) -> int:
     command, *rest = list(arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())), end="")
@@ -98,26 +120,13 @@ def _answer_unless_interrupted(arguments: Sequence[str]) -> int:
     if command in ("-V", "--version"):
         print(f"exneat {__version__}")
         return 0
-    try:
-        if command not in COMMANDS:
-            raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
-        if rest in (["--help"], ["-h"]) and command in USAGE:
-            print(USAGE[command])
-            return 0
-        with heeding():
-            code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
-        return code
-    except ExneatError as error:
-        print(f"exneat: {_printable(str(error))}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:
+    if command not in COMMANDS:
+        raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
+    if rest in (["--help"], ["-h"]) and command in USAGE:
+        print(USAGE[command])
         return 0
-    except OSError as error:
-        if error.errno not in _NO_ROOM:
-            raise
-        where = error.filename or "temporary files or the program's own output"
-        print(f"exneat: {where}: {error.strerror}; check the disk, output= and TMPDIR", file=sys.stderr)
-        return 2
+    code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
+    return code
 
 
 def _drop_what_nobody_reads() -> None:

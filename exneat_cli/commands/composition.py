@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,9 @@ from omegaconf.errors import OmegaConfBaseException
 import exneat_cli
 from exneat_cli.commands.complaints import in_our_words
 from exneat_cli.commands.overrides import check_overrides
-from exneat_cli.commands.own_files import check_own_files, without_marks
+from exneat_cli.commands.own_files import check_own_files
 from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.interruption import as_worker, heeding, scratch_directory, unheard_by_children
+from exneat_cli.interruption import as_worker, launching, signal_heard
 from exneat_cli.rollouts import keep_clusters
 from exneat_cli.runs import RunSettings
 
@@ -75,12 +76,13 @@ def run_composed(
     check_overrides(overrides, configuration_directory())
     try:
         # Jobs that are done one after the other share a cluster: starting one takes seconds.
-        with scratch_directory() as scratch, keep_clusters():
-            flags = [without_marks(flag, scratch) for flag in flags]
+        # Hydra saves a multirun.yaml into hydra.sweep.dir and cannot be told not to.
+        with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as scratch, keep_clusters():
             sys.argv = [program, *flags, *_HYDRA_OVERRIDES, f"hydra.sweep.dir={scratch}", *overrides]
             elsewhere = any(override.lstrip("+").startswith("hydra/launcher=") for override in overrides)
-            with heeding(), unheard_by_children() if elsewhere else contextlib.nullcontext():
-                hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(_guarded(job, raised))()
+            guarded = _guarded(job, raised, Path(scratch))
+            with launching(Path(scratch)) if elsewhere else contextlib.nullcontext():
+                hydra.main(version_base="1.3", config_path=directory, config_name=config_name)(guarded)()
     except SystemExit as stop:
         if stop.code:
             raise ExneatError(f"{program}: the flags make no sense to Hydra, see {program} --hydra-help") from stop
@@ -93,15 +95,19 @@ def run_composed(
         raise raised[0]
 
 
-def _guarded(job: Callable[[DictConfig], None], raised: list[BaseException]) -> Callable[[DictConfig], None]:
+def _guarded(
+    job: Callable[[DictConfig], None], raised: list[BaseException], workplace: Path
+) -> Callable[[DictConfig], None]:
     """The job, which notes in `raised` what it raises."""
     asked_by = os.getpid()
 
     def guarded(config: DictConfig) -> None:
         try:
-            with contextlib.nullcontext() if os.getpid() == asked_by else as_worker(), heeding():
+            with contextlib.nullcontext() if os.getpid() == asked_by else as_worker(workplace):
                 job(config)
         except BaseException as error:
+            if signal_heard() is not None:
+                raise KeyboardInterrupt from error  # Hydra would go on to the next job after any other error
             raised.append(error)
             if isinstance(error, ExneatError) and HydraConfig.get().mode is not RunMode.MULTIRUN:
                 return  # raised below: Hydra would print lines of its own about it

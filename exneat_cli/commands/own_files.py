@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import shutil
 from pathlib import Path
 
 from exneat_cli.errors import ExneatError, shortened
@@ -34,6 +33,8 @@ def check_own_files(directory: Path, packaged: Path | None) -> None:
         for key, line, value in check_yaml(path):
             if key == "_target_" and not value.startswith(_CODE_MAY_COME_FROM):
                 raise ExneatError(f"{path}:{line}: _target_ would call {value}; a configuration may not call code")
+        if path.read_bytes().startswith(codecs.BOM_UTF8):
+            raise ExneatError(f"{path}: begins with a byte order mark, which Hydra misreads; save it without one")
         _check_defaults(path, read_yaml(path).get("defaults", []))
 
 
@@ -43,26 +44,3 @@ def _check_defaults(path: Path, defaults: object) -> None:
         if not isinstance(entry, str) and not (isinstance(entry, dict) and len(entry) == 1):
             came = shortened(defaults if entry is None else entry)
             raise ExneatError(f"{path}: defaults: expected a list of entries such as /evolution: recurrent, got {came}")
-
-
-def without_marks(flag: str, scratch: Path) -> str:
-    """The flag's directory, or a copy whose files have no byte order mark: behind one, Hydra misses `# @package`.
-
-    Args:
-        flag: a flag, or what came after one.
-        scratch: where a copy may be made.
-    """
-    directory = Path(flag)
-    if not directory.is_absolute() or not directory.is_dir():
-        return flag
-    marked = [path for path in directory.rglob("*.yaml") if path.read_bytes().startswith(codecs.BOM_UTF8)]
-    if not marked:
-        return flag
-    copy = scratch / "configuration"
-    for path in directory.rglob("*.yaml"):
-        target = copy / path.relative_to(directory)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, target)
-        if path in marked:
-            target.write_bytes(path.read_bytes().removeprefix(codecs.BOM_UTF8))
-    return str(copy)

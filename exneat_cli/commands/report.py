@@ -7,13 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from exneat_cli.analysis.artefacts import Built
-from exneat_cli.analysis.catalogue import FigurePlan, Panel, TablePlan, read_catalogue
-from exneat_cli.analysis.comparisons import build_comparison
+from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel, TablePlan, read_catalogue
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
-from exneat_cli.analysis.tables import build_table
+from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.composition import BUDGETS
 from exneat_cli.commands.experiments import (
     Experiment,

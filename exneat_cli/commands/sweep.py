@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Sequence
@@ -17,9 +18,9 @@ from exneat_cli.commands.drawing import draw_what_is_missing
 from exneat_cli.commands.experiments import Experiment, Job, budget_of, plan_jobs, read_experiment
 from exneat_cli.commands.overrides import check_overrides
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import heeding, scratch_directory
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import DONE
-from exneat_cli.runs import Silence, progress_for_terminal, run_robustness, train
+from exneat_cli.runs import Progress, progress_for_terminal, run_robustness, train
 
 _BASIC_LAUNCHER = "hydra._internal.core_plugins.basic_launcher.BasicLauncher"
 
@@ -39,8 +40,8 @@ def run(arguments: Sequence[str]) -> int:
     pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     done_before = len(jobs) - len(pending)
     print(f"{experiment.name}, budget {budget}: {len(jobs)} runs, {done_before} of them finished before", flush=True)
-    with scratch_directory() as notes:
-        launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], notes)
+    with tempfile.TemporaryDirectory(prefix="exneat-") as notes:
+        launch = Launch(jobs, pending, ["exneat", "sweep", *arguments], Path(notes))
         if pending:
             _launch(launch, for_hydra)
         return _summarise(experiment, launch, done_before)
@@ -51,7 +52,7 @@ def _launch(launch: Launch, for_hydra: Sequence[str]) -> None:
     try:
         run_composed("exneat sweep", ["--multirun", f"+job={names}", *for_hydra], launch)
     except ExneatError as error:
-        if not any(job.is_finished() for job in launch.pending.values()):
+        if signal_heard() is not None or not any(job.is_finished() for job in launch.pending.values()):
             raise
         # A launcher gives up when one of its processes is killed: what was done by then counts.
         print(f"exneat: {error}", file=sys.stderr)
@@ -102,13 +103,15 @@ class Launch:
         in_turn = HydraConfig.get().launcher["_target_"] == _BASIC_LAUNCHER
         began = time.time()
         try:
-            with heeding():
-                figure = self._do(job, show_bar=in_turn and sys.stderr.isatty())
-        except ExneatError as error:
-            self._tell_failure(job, str(error))
+            figure = self._do(job, show_bar=in_turn and sys.stderr.isatty())
         except Exception as error:
-            traceback.print_exc()
-            self._tell_failure(job, f"{type(error).__name__}: {error}")
+            if signal_heard() is not None:
+                raise
+            if isinstance(error, ExneatError):
+                self._tell_failure(job, str(error))
+            else:
+                traceback.print_exc()
+                self._tell_failure(job, f"{type(error).__name__}: {error}")
         else:
             done, left = self._done_and_left()
             print(f"{done} {job.name}: {figure} in {time.time() - began:.1f} s{left}", flush=True)
@@ -123,7 +126,7 @@ class Launch:
 
     def _do(self, job: Job, *, show_bar: bool) -> str:
         settings, asked = job.settings, job.sweeps
-        progress = progress_for_terminal() if show_bar else Silence()
+        progress = progress_for_terminal() if show_bar else Progress()
         finished = train(settings, progress=progress, command=self.command, go_on=True)
         directory = finished.directory
         run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import scratch_directory
 from exneat_cli.records.files import write_whole
 from exneat_cli.records.run_directory import RunDirectory
 
@@ -76,8 +76,8 @@ def free_bytes(root: Path) -> int:
 def _trial_directory(root: Path) -> Iterator[Path]:
     above = nearest_directory(root)
     try:
-        with scratch_directory(".exneat-doctor-", above) as path:
-            yield path
+        with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=above) as path:
+            yield Path(path)
     except OSError as error:
         raise ExneatError(f"{above}: {error.strerror}") from error
     except ExneatError as error:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import finishing
+from exneat_cli.interruption import uninterrupted
 
 _LARGEST_TEXT = 64 * 1024**2
 _TEMPORARY = re.compile(r"\..+\.(\d{1,10})\.tmp")
@@ -29,7 +29,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     data = content.encode("utf-8") if isinstance(content, str) else content
-    with finishing():
+    with uninterrupted():
         try:
             with temporary.open("wb") as file:
                 file.write(data)

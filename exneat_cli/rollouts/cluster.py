@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import logging
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -16,7 +17,6 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import scratch_directory
 from exneat_cli.rollouts.executor import Executor
 
 CONNECT_SECONDS = 8
@@ -123,7 +123,7 @@ class Cluster:
     def _start(self, workers: int) -> Any:
         from distributed import Client, LocalCluster
 
-        scratch = self._ending.enter_context(scratch_directory())
+        scratch = self._ending.enter_context(tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True))
         cluster = LocalCluster(
             n_workers=0,  # those that `scale` adds come up while the caller goes on
             threads_per_worker=1,
@@ -133,10 +133,10 @@ class Cluster:
             scheduler_kwargs={
                 "dashboard": False,
                 "dashboard_address": "127.0.0.1:0",
-                "local_directory": str(scratch),
+                "local_directory": scratch,
             },
             memory_limit=0,
-            local_directory=str(scratch),
+            local_directory=scratch,
             silence_logs=logging.CRITICAL,
             config={"distributed.worker.profile.enabled": False},
         )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from typing import Protocol, TextIO
+from typing import TextIO
 
 from exneat_cli.records import HistoryRow
 
 
-class Progress(Protocol):
-    """What a training loop calls."""
+class Progress:
+    """What a training tells; this one says nothing, which is the default from Python."""
 
     def start(self, title: str, generations: int) -> None:
         """Training begins."""
@@ -24,23 +24,7 @@ class Progress(Protocol):
         """Training is over, whether it went well or not."""
 
 
-class Silence:
-    """No progress at all: the default from Python."""
-
-    def start(self, title: str, generations: int) -> None:
-        """Say nothing."""
-
-    def say(self, text: str) -> None:
-        """Say nothing."""
-
-    def generation(self, row: HistoryRow) -> None:
-        """Say nothing."""
-
-    def stop(self) -> None:
-        """Say nothing."""
-
-
-class Lines:
+class Lines(Progress):
     """About ten plain lines per run, for logs."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -58,18 +42,13 @@ class Lines:
 
     def generation(self, row: HistoryRow) -> None:
         """Print every tenth part of the run, and the last generation."""
-        interval = max(1, self._generations // 10)
-        if row["generation"] % interval == 0 or row["generation"] == self._generations:
-            self.say(
-                f"generation {row['generation']}/{self._generations}  {_figures(row)}"
-                f"  {row['wall_seconds'] / row['generation']:.2f} s each"
-            )
-
-    def stop(self) -> None:
-        """Nothing to tidy up."""
+        number = row["generation"]
+        if number % max(1, self._generations // 10) == 0 or number == self._generations:
+            each = row["wall_seconds"] / number
+            self.say(f"generation {number}/{self._generations}  {_figures(row)}  {each:.2f} s each")
 
 
-class Bar:
+class Bar(Progress):
     """A live bar with the figures of the last generation and the time left."""
 
     def __init__(self) -> None:

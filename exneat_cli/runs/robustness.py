@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brain, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.interruption import finishing
 from exneat_cli.records import (
     DONE,
     MANIFEST_FORMAT,
@@ -21,7 +20,7 @@ from exneat_cli.records import (
     read_yaml,
 )
 from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
-from exneat_cli.runs.progress import Progress, Silence
+from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import Score, robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 
@@ -124,7 +123,7 @@ def run_robustness(
             levels = missing_levels(directory, sweep, episodes)
             if not levels:
                 continue
-            (progress or Silence()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
+            (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             todo = Sweep(sweep.name, sweep.parameter, levels)
             seeds = unseen_episodes(settings, episodes)
             tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
@@ -137,10 +136,9 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
     rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
     failed = [each.failed_episodes for each in scores.values()]
     named = [f"{sweep.name}={row.level!r}, {row.episodes} episodes" for row in rows]
-    with finishing():
-        # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
-        _count_failures(directory, dict(zip(named, failed, strict=True)))
-        merge_robustness(directory.robustness, rows)
+    # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+    _count_failures(directory, dict(zip(named, failed, strict=True)))
+    merge_robustness(directory.robustness, rows)
 
 
 def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:

@@ -5,44 +5,34 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-import numpy as np
 import yaml
 
-from exneat_cli.algorithms import Team
-from exneat_cli.brains import Brain, acting_by_rule, assemble, motionless
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import before_the_end, heeding
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import (
     DONE,
     FAILED,
     INTERRUPTED,
     MANIFEST_FORMAT,
     RUNNING,
-    UNPERTURBED,
-    Champion,
-    Checkpoint,
     Claim,
-    HistoryRow,
     RunDirectory,
-    merge_robustness,
     provenance,
     read_checkpoints,
-    write_champion,
     write_checkpoint,
-    write_csv,
-    write_hall_of_fame,
     write_history,
 )
-from exneat_cli.rollouts import Runner, Trace, keep_clusters
-from exneat_cli.runs.progress import Progress, Silence
-from exneat_cli.runs.scores import robustness_row, score_all, score_brains, summary_sentence, unseen_episodes
+from exneat_cli.rollouts import Runner, keep_clusters
+from exneat_cli.runs.champion import choose_champion, measure_baseline
+from exneat_cli.runs.progress import Progress
+from exneat_cli.runs.scores import summary_sentence
 from exneat_cli.runs.settings import RunSettings
-from exneat_cli.runs.training import Trained, evolve
-from exneat_cli.seeding import STREAMS, shared_episodes
+from exneat_cli.runs.training import Training
+from exneat_cli.seeding import STREAMS
 
 
 @dataclass(frozen=True)
@@ -82,53 +72,72 @@ def train(
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
+    progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
     resume, lengthen = settings.resume or go_on, settings.resume
     with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as claim:
         if claim is not Claim.FINISHED:
-            _train_in(directory, settings, progress or Silence(), command)
+            with _recorded(directory, settings, progress, command) as result:
+                if settings.algorithm.rule:
+                    result |= measure_baseline(settings, directory)
+                else:
+                    training = Training.resumed(
+                        settings, read_checkpoints(directory.path, settings.full_hash), progress.say
+                    )
+                    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
+                        while not training.is_over:
+                            training.advance(runner)
+                            _save(directory, training)
+                            progress.generation(training.history[-1])
+                    result |= choose_champion(training, directory, progress)
         result = directory.read_result()
     trained_now = claim is not Claim.FINISHED
     return Finished(directory, result, summary_sentence(settings.task, result), trained_now=trained_now)
 
 
-def _train_in(directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]) -> None:
+def _save(directory: RunDirectory, training: Training) -> None:
+    """Write down the generation that is done."""
+    if signal_heard() is not None:  # Python drops an exception that comes up in a callback of a weak reference
+        raise KeyboardInterrupt
+    write_history(directory.history, training.history)
+    if training.is_over or len(training.history) % training.settings.checkpoint_every == 0:
+        write_checkpoint(directory.path, training.checkpoint(), training.settings.full_hash)
+
+
+@contextlib.contextmanager
+def _recorded(
+    directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]
+) -> Iterator[dict[str, Any]]:
+    """Keep the manifest: how the run began and how it ended; yields what becomes its result."""
     before = directory.read_manifest() if directory.is_there() else {}
     manifest = _first_manifest(settings, command)
     if before:
         _tell_other_versions(before, progress)
         manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
         directory.forget_what_was_derived()
-    with _marking_interruption(directory):
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
-        try:
-            with heeding():
-                result = _do(settings, directory, progress)
-        except Exception as error:
-            with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-                directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
-            raise
-        finally:
-            progress.stop()
-        directory.update_manifest(status=DONE, finished=_now(), result=result)
-
-
-@contextlib.contextmanager
-def _marking_interruption(directory: RunDirectory) -> Iterator[None]:
-    """Whoever looks at the run later is told that it was interrupted amid the block."""
-
-    def mark() -> None:
-        if directory.read_manifest().get("status") == RUNNING:
-            directory.update_manifest(status=INTERRUPTED)
-
+    result: dict[str, Any] = {}
     try:
-        with before_the_end(mark):
-            yield
-    except KeyboardInterrupt:
-        with contextlib.suppress(ExneatError):  # a full disk must not turn this into a failure
-            mark()
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        progress.start(directory.path.name, settings.generations)
+        yield result
+        directory.update_manifest(status=DONE, finished=_now(), result=result)
+    except (Exception, KeyboardInterrupt) as error:
+        _mark_unfinished(directory, error)
         raise
+    finally:
+        progress.stop()
+
+
+def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
+    interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+        if not directory.is_there() or directory.read_manifest().get("status") != RUNNING:
+            return
+        if interrupted:
+            directory.update_manifest(status=INTERRUPTED)
+        else:
+            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
 
 
 def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:
@@ -157,91 +166,6 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, 
         "cores": os.cpu_count(),
         "git_commit": provenance.git_commit(),
     }
-
-
-def _do(settings: RunSettings, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
-    progress.start(directory.path.name, settings.generations)
-    if settings.algorithm.rule:
-        return _test_baseline(settings, directory)
-
-    def report(history: list[HistoryRow]) -> None:
-        write_history(directory.history, history)
-        progress.generation(history[-1])
-
-    def save(checkpoint: Checkpoint) -> None:
-        write_checkpoint(directory.path, checkpoint, settings.full_hash)
-
-    checkpoints = read_checkpoints(directory.path, settings.full_hash)
-    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        trained = evolve(settings, runner, report, checkpoints=checkpoints, say=progress.say, save=save)
-    last = trained.history[-1]
-    spent = {key: last[key] for key in ("episodes", "env_steps", "wall_seconds")}
-    directory.update_manifest(budget_spent=spent)
-    progress.say(f"validating {len(trained.candidates)} teams of the hall of fame")
-    return _choose_champion(settings, directory, trained)
-
-
-def _choose_champion(settings: RunSettings, directory: RunDirectory, trained: Trained) -> dict[str, Any]:
-    entries = trained.candidates
-    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        brains = [_compile(settings, entry.team) for entry in entries]
-        validation = score_brains(runner, brains, "validation", settings.validation_episodes)
-        best = max(range(len(entries)), key=lambda k: validation[k].fitness_mean)
-        first = _compile(settings, trained.first_generation)
-        tested = score_brains(runner, [brains[best], _standing_still(settings), first], "test", settings.test_episodes)
-        trace = runner.trace(brains[best], shared_episodes("test", 1)[0])
-    scores = {
-        "training": {"fitness": entries[best].fitness, "generation": entries[best].generation + 1},
-        "validation": asdict(validation[best]),
-        "test": asdict(tested[0]),
-    }
-    write_hall_of_fame(directory.hall_of_fame, entries, [each.fitness_mean for each in validation])
-    write_champion(directory.champion, _champion(settings, entries[best].team, scores))
-    _write_trace(settings, directory, trace)
-    names = ("champion", "standing_still", "first_generation")
-    training = {"training": trained.history[-1]["best_so_far"], "validation": validation[best].fitness_mean}
-    return {**training, **{name: asdict(each) for name, each in zip(names, tested, strict=True)}}
-
-
-def _test_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
-    assert settings.algorithm.rule is not None
-    acting = acting_by_rule(settings.algorithm.rule, settings.task)
-    episodes = unseen_episodes(settings, settings.test_episodes)
-    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_all(runner.run([acting] if isinstance(acting, Brain) else acting, episodes))
-        (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
-        trace = runner.trace(acting, episodes[0])
-    _write_trace(settings, directory, trace)
-    merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
-    return {"champion": asdict(tested), "standing_still": asdict(standing)}
-
-
-def _compile(settings: RunSettings, team: Team) -> Brain:
-    return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
-
-
-def _standing_still(settings: RunSettings) -> Brain:
-    return motionless(settings.task.sensed_size, settings.task.resting_action)
-
-
-def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
-    return Champion(
-        variant=settings.variant,
-        task=settings.to_plain()["task"],
-        actuators=settings.task.actuator_names,
-        feed_forward=settings.evolution.feed_forward,
-        plan=settings.plan,
-        genomes=team.genomes,
-        scores=scores,
-    )
-
-
-def _write_trace(settings: RunSettings, directory: RunDirectory, trace: Trace) -> None:
-    columns = ("step", *settings.task.trace_columns, *settings.task.terms)
-    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.steps.tolist())])
-    if trace.tiles is not None:
-        tiles = [(*place, *trace.tiles[place].tolist()) for place in np.ndindex(trace.tiles.shape[:2])]
-        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), tiles)
 
 
 def _now() -> str:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms import (
-    Candidate,
     Problem,
     Results,
     Search,
@@ -22,7 +21,6 @@ from exneat_cli.algorithms import (
     unpack_teams,
 )
 from exneat_cli.brains import assemble_all
-from exneat_cli.errors import ExneatError
 from exneat_cli.records import Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
@@ -30,69 +28,6 @@ from exneat_cli.seeding import training_episodes
 from exneat_cli.wiring import pooled_by_pin
 
 _FIRST = "first_generation"
-
-
-class Trained(NamedTuple):
-    """What training leaves behind.
-
-    Attributes:
-        candidates: teams that may become the champion, best first; never empty.
-        first_generation: the best team of the first generation, which is random.
-        history: one row per generation.
-    """
-
-    candidates: list[Candidate]
-    first_generation: Team
-    history: list[HistoryRow]
-
-
-def evolve(
-    settings: RunSettings,
-    runner: Runner,
-    report: Callable[[list[HistoryRow]], None],
-    *,
-    checkpoints: Iterable[Checkpoint | str] = (),
-    say: Callable[[str], None] = lambda _: None,
-    save: Callable[[Checkpoint], None] | None = None,
-) -> Trained:
-    """Train one variant.
-
-    Args:
-        settings: of the run.
-        runner: runs training episodes.
-        report: called with all rows so far after each generation.
-        checkpoints: the newest first, with a line in place of each that cannot be read; training goes on from the
-            first one that is sound, else from the beginning, with the same results.
-        say: told what it goes on from.
-        save: called with a checkpoint every `settings.checkpoint_every` generations, and after the last.
-
-    Raises:
-        ExneatError: not a single team ever finished its episodes.
-    """
-    training = _begin_or_go_on(settings, checkpoints, say)
-    search, history = training.search, training.history
-    while len(history) < settings.generations:
-        turns: list[_Turn] = []
-        over = False
-        while not over:
-            trials = search.ask()
-            genomes = [team.genomes for team in trials.teams]
-            brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
-            first = sum(turn.outcomes.steps.shape[1] for turn in turns)
-            episodes = training_episodes(settings.seed, len(history), trials.episodes, first)
-            outcomes = runner.run(brains, episodes, moments=settings.algorithm.wants_moments)
-            turns.append(_Turn(trials.teams, outcomes, _results(settings, outcomes)))
-            over = search.tell(turns[-1].results)
-        training.record(turns)
-        report(history)
-        done = len(history)
-        if save is not None and (done % settings.checkpoint_every == 0 or done == settings.generations):
-            save(training.checkpoint())
-    candidates = search.candidates()
-    if not candidates:
-        raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
-    assert training.first_generation is not None
-    return Trained(candidates, training.first_generation, history)
 
 
 class _Turn(NamedTuple):
@@ -104,22 +39,91 @@ class _Turn(NamedTuple):
 
 
 @dataclass
-class _Training:
-    """The state that a generation hands to the next."""
+class Training:
+    """A training between two generations; `advance` does the next one.
+
+    Attributes:
+        settings: of the run.
+        search: the algorithm at work.
+        history: one row per generation that is done.
+        first_generation: the best team of the first generation, which is random; None before it.
+        began: clock time (s) at which an undisturbed training would have begun.
+    """
 
     settings: RunSettings
     search: Search
-    history: list[HistoryRow]
-    first_generation: Team | None
-    began: float
+    history: list[HistoryRow] = field(default_factory=list)
+    first_generation: Team | None = None
+    began: float = field(default_factory=time.perf_counter)
 
-    def record(self, turns: Sequence[_Turn]) -> None:
-        """Add the row of a generation that is over."""
+    @classmethod
+    def start(cls, settings: RunSettings) -> Training:
+        """Begin with the first generation."""
+        return cls(settings, settings.algorithm.start(_problem(settings)))
+
+    @classmethod
+    def restored(cls, settings: RunSettings, checkpoint: Checkpoint) -> Training:
+        """The training that `checkpoint` was taken of, or one that goes on just as it would have.
+
+        Raises:
+            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is damaged, or of other settings.
+        """
+        problem = _problem(settings)
+        history = [_sound(number, row) for number, row in enumerate(checkpoint.plain["history"], start=1)]
+        if not 1 <= len(history) == checkpoint.generation <= settings.generations:
+            raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
+        (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
+        search = settings.algorithm.restored(problem, State(checkpoint.plain["search"], checkpoint.arrays))
+        return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
+
+    @classmethod
+    def resumed(
+        cls, settings: RunSettings, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
+    ) -> Training:
+        """Go on from the first checkpoint that is sound, else begin; the results are the same.
+
+        Args:
+            settings: of the run.
+            checkpoints: the newest first, with a line in place of each that cannot be read.
+            say: told what it goes on from.
+        """
+        for checkpoint in checkpoints:
+            if isinstance(checkpoint, str):
+                say(checkpoint)
+                continue
+            try:
+                training = cls.restored(settings, checkpoint)
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+                say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
+            else:
+                say(f"going on after generation {checkpoint.generation}")
+                return training
+        return cls.start(settings)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all generations are done."""
+        return len(self.history) >= self.settings.generations
+
+    def advance(self, runner: Runner) -> None:
+        """Evaluate one generation, in as many turns as the algorithm wants, and record it."""
+        settings, turns, over = self.settings, list[_Turn](), False
+        while not over:
+            trials = self.search.ask()
+            genomes = [team.genomes for team in trials.teams]
+            brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
+            done = sum(turn.outcomes.steps.shape[1] for turn in turns)
+            episodes = training_episodes(settings.seed, len(self.history), trials.episodes, first=done)
+            outcomes = runner.run(brains, episodes, moments=settings.algorithm.wants_moments)
+            turns.append(_Turn(trials.teams, outcomes, _results(settings, outcomes)))
+            over = self.search.tell(turns[-1].results)
+        self._record(turns)
+
+    def _record(self, turns: Sequence[_Turn]) -> None:
         before = self.history[-1] if self.history else None
         teams = [team for turn in turns for team in turn.teams]
         fitness = [value for turn in turns for value in turn.results.fitness.mean(axis=1).tolist()]
-        failed = [bool(value) for turn in turns for value in turn.results.failed]
-        sound = [k for k, value in enumerate(failed) if not value]
+        sound = np.flatnonzero(~np.concatenate([turn.results.failed for turn in turns])).tolist()
         best = max(sound or range(len(teams)), key=lambda k: fitness[k])
         if self.first_generation is None:
             self.first_generation = teams[best]
@@ -152,10 +156,8 @@ class _Training:
         return Checkpoint(len(self.history), plain, arrays)
 
 
-def _begin_or_go_on(
-    settings: RunSettings, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
-) -> _Training:
-    problem = Problem(
+def _problem(settings: RunSettings) -> Problem:
+    return Problem(
         plan=settings.plan,
         evolution=settings.evolution,
         population=settings.population,
@@ -163,34 +165,12 @@ def _begin_or_go_on(
         pairing=settings.pairing,
         seed=settings.seed,
     )
-    for checkpoint in checkpoints:
-        if isinstance(checkpoint, str):
-            say(checkpoint)
-            continue
-        try:
-            training = _restored(settings, problem, checkpoint)
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
-        else:
-            say(f"going on after generation {checkpoint.generation}")
-            return training
-    return _Training(settings, settings.algorithm.start(problem), [], None, time.perf_counter())
 
 
-def _restored(settings: RunSettings, problem: Problem, checkpoint: Checkpoint) -> _Training:
-    """The training that `checkpoint` was taken of, or one that goes on just as it would have."""
-    plain: Mapping[str, Any] = checkpoint.plain
-    history = [_row(number, row) for number, row in enumerate(plain["history"], start=1)]
-    if not 1 <= len(history) == checkpoint.generation <= settings.generations:
-        raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
-    (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
-    search = settings.algorithm.restored(problem, State(plain["search"], checkpoint.arrays))
-    return _Training(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
-
-
-def _row(number: int, row: Mapping[str, Any]) -> HistoryRow:
-    sound = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
-    if not sound or row["generation"] != number:
+def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
+    """A row of a checkpoint, which must be that of generation `number`."""
+    finite = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
+    if not finite or row["generation"] != number:
         raise ValueError(f"expected the figures of generation {number}, got {row}")
     return dict(row)
 

@@ -7,9 +7,15 @@ from pathlib import Path
 
 from exneat_cli.analysis.study import PlannedRun, Study
 from exneat_cli.records import DONE, HistoryRow, RunDirectory, write_csv, write_history, write_json
+from exneat_cli.records.history import COLUMNS
 
 Levels = Mapping[tuple[str, float], tuple[float, float]]
 """(sweep, level) -> mean fitness and mean full reward."""
+
+
+def history_row(*figures: float) -> HistoryRow:
+    """A row of history.csv, in the order of its columns."""
+    return dict(zip(COLUMNS, figures, strict=True))
 
 
 def plan_study(
@@ -73,7 +79,7 @@ def finish(
     if curve:
         write_history(
             directory.history,
-            [HistoryRow(g, b, b, b, b, g, g, 1, 9, 0, 0, 0, 0.1 * g) for g, b in enumerate(curve, start=1)],
+            [history_row(g, b, b, b, b, g, g, 1, 9, 0, 0, 0, 0.1 * g) for g, b in enumerate(curve, start=1)],
         )
         manifest["budget_spent"] = {"episodes": episodes, "env_steps": env_steps, "wall_seconds": 90.5}
         result = {"training": curve[-1], "validation": validation, **result}

@@ -13,13 +13,13 @@ from exneat_cli.analysis.study import PlannedRun, Study
 from exneat_cli.records import (
     DONE,
     UNPERTURBED,
-    HistoryRow,
     RobustnessRow,
     RunDirectory,
     merge_robustness,
     write_history,
     write_json,
 )
+from tests.analysis.fake_studies import history_row
 
 LEVELS = tuple(round(0.1 * k, 1) for k in range(6))
 SWEEPS = {"sensor_noise": "sensor noise (standard deviation)", "gap": "gap before the goal (tiles)"}
@@ -74,7 +74,7 @@ def finish(run: RunDirectory, variant: str, seed: int, height: float, generation
     best = height * 0.5 + np.cumsum(gains) + 0.03 * height * seed
     steps = np.cumsum(rng.integers(5_000, 9_000, generations))
     rows = [
-        HistoryRow(g + 1, float(best[g]), 0.0, 0.0, float(best[g]), 1000 * (g + 1), int(steps[g]), 1, 8, 0, 0, 0, 0.1)
+        history_row(g + 1, float(best[g]), 0.0, 0.0, float(best[g]), 1000 * (g + 1), int(steps[g]), 1, 8, 0, 0, 0, 0.1)
         for g in range(generations)
     ]
     write_history(run.history, rows)
@@ -113,8 +113,8 @@ def has_white_edges(path: Path) -> bool:
     return all(bool((edge == 1.0).all()) for edge in edges)
 
 
-def a_pin(kind: str, index: int, module: int = -1, *, delayed: bool = False) -> dict[str, Any]:
-    return {"kind": kind, "index": index, "module": module, "delayed": delayed}
+def a_pin(index: int, module: int = -1, *, delayed: bool = False) -> dict[str, Any]:
+    return {"index": index, "module": module, "delayed": delayed}
 
 
 def a_module(name: str, position: tuple[float, float], subpopulation: int, **others: Any) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def a_champion(
 ) -> dict[str, Any]:
     """What a champion file holds, as far as pictures need it."""
     return {
-        "format": 1,
+        "format": 2,
         "variant": "made-up",
         "task": {"name": "made_up"},
         "actuators": list(actuators),
@@ -156,7 +156,7 @@ def grid_champion() -> dict[str, Any]:
     connection to output 1 starts at node 4's only source, the second sensor.
     """
     connections = [(-1, 2, 1.5), (2, 3, -0.5), (3, 0, 2.0), (2, 0, 0.3), (-2, 4, 1.0), (-2, 1, -1.0), (1, 1, 0.7)]
-    body = a_module("body", (0.0, 0.0), 0, pins=[a_pin("sensor", k) for k in range(2)], outputs=2, drives=[0, 1])
+    body = a_module("body", (0.0, 0.0), 0, pins=[a_pin(k) for k in range(2)], outputs=2, drives=[0, 1])
     champion = a_champion([body], [a_genome([0, 1, 2, 3, 4], connections)], ["left", "right"], 2)
     return {**champion, "feed_forward": False}
 
@@ -177,13 +177,13 @@ def modular_champion() -> dict[str, Any]:
             name,
             place,
             0,
-            pins=[a_pin("sensor", 2 * k), a_pin("sensor", 2 * k + 1), a_pin("hidden", 0, (k + 1) % 4, delayed=True)],
+            pins=[a_pin(2 * k), a_pin(2 * k + 1), a_pin(1, (k + 1) % 4, delayed=True)],
             outputs=1,
             hidden=1,
         )
         for k, (name, place) in enumerate(places.items())
     ]
-    reads = [a_pin("sensor", 8), *(a_pin("output", 0, leg) for leg in range(3))]
+    reads = [a_pin(8), *(a_pin(0, leg) for leg in range(3))]
     central = a_module("central", (0.0, 0.0), 1, pins=reads, outputs=2, drives=[0, 1])
     leg_genome = a_genome([0, 1], [(-1, 1, 0.5), (-2, 1, -0.8), (-3, 1, 0.2), (1, 0, 1.2)])
     middle = a_genome([0, 1], [(-k, k % 2, 0.4 * k - 1.0) for k in range(1, 5)])

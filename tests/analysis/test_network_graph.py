@@ -11,15 +11,14 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, PathPatch
 
-from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config
+from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings, Problem
 from exneat_cli.analysis.network_data import ChampionGraph, champion_graph, read_champion_graph
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import Layout, depths, lay_out, natural_size, page_direction
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import Champion, RunDirectory, write_champion, write_json
-from exneat_cli.seeding import stream
 from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import Geometry, Wiring, plan_wiring
+from exneat_cli.wiring import Geometry, Wiring
 from tests.analysis.figure_studies import (
     a_champion,
     a_genome,
@@ -254,10 +253,9 @@ def test_a_damaged_champion_is_an_error_of_one_line(tmp_path: Path, damage: Any)
 def test_the_champions_that_runs_write_can_be_drawn(tmp_path: Path, algorithm: str, linkage: str) -> None:
     task = AntTask()
     geometry = Geometry("all" if algorithm == "exneat" else "single")
-    plan = plan_wiring(task, algorithm, geometry, linkage, Wiring(), hidden=4)
-    configs = [neat_config(EvolutionSettings(), 4, shape) for shape in plan.subpopulation_shapes]
-    seeds = [stream(0, "evolution", k) for k in range(len(configs))]
-    team = Coevolution(configs, seeds, stream(0, "pairing")).ask()[0]
+    settings, evolution = ALGORITHMS[algorithm](), EvolutionSettings(neat_hidden=4)
+    plan = settings.plan(task, geometry, linkage, Wiring(), evolution)
+    team = settings.start(Problem(plan, evolution, 4, 1, "rank", 0)).ask().teams[0]
     scores = {"test": {"fitness_mean": 1.0, "fitness_std": 0.0, "episodes": 1}}
     run = RunDirectory(tmp_path)
     names = task.actuator_names

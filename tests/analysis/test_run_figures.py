@@ -5,18 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from exneat_cli.analysis.figures import tick_levels
 from matplotlib.figure import Figure
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
-from exneat_cli.analysis.figures import tick_levels
-from exneat_cli.records import HistoryRow, RunDirectory, merge_robustness, read_robustness, write_csv, write_history
+from exneat_cli.records import RunDirectory, merge_robustness, read_robustness, write_csv, write_history
+from tests.analysis.fake_studies import history_row
 from tests.analysis.figure_studies import has_white_edges, write_robustness
 
 
 def a_run(directory: Path) -> RunDirectory:
     run = RunDirectory(directory)
     directory.mkdir(parents=True)
-    rows = [HistoryRow(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in range(1, 9)]
+    rows = [history_row(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in range(1, 9)]
     write_history(run.history, rows)
     write_csv(
         run.trace, ["step", "x", "y", "z", "forward_reward"], [(t, 0.1 * t, 0.01 * t * t, 0.5, 2.0) for t in range(50)]
@@ -43,7 +44,7 @@ def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_a_run_of_a_single_generation_can_be_drawn(tmp_path: Path) -> None:
     run = a_run(tmp_path / "run")
-    write_history(run.history, [HistoryRow(1, 2.0, 1.0, 1.5, 2.0, 10, 500, 1, 96, 4, 0, 0, 0.1)])
+    write_history(run.history, [history_row(1, 2.0, 1.0, 1.5, 2.0, 10, 500, 1, 96, 4, 0, 0, 0.1)])
     assert draw_training(run, "fitness")
 
 

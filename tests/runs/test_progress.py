@@ -9,7 +9,8 @@ from exneat_cli.runs import Lines
 
 
 def row(generation: int) -> HistoryRow:
-    return HistoryRow(generation, 12.34, 5.0, 4.0, 12.34, 10, 500, 1, 96, 4, 0, 0, 2.0 * generation)
+    figures = {"best_fitness": 12.34, "mean_fitness": 5.0, "best_so_far": 12.34}
+    return {"generation": generation, **figures, "wall_seconds": 2.0 * generation}
 
 
 def test_a_log_gets_about_ten_lines_and_always_the_last_generation() -> None:

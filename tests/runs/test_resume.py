@@ -12,7 +12,7 @@ from exneat_cli.algorithms import RECURRENT
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Sweep
-from exneat_cli.runs import RunSettings, run_robustness, train
+from exneat_cli.runs import Progress, RunSettings, champion, run_robustness, train
 from exneat_cli.runs import run as run_module
 from exneat_cli.tasks import AntTask, TrackMaze
 from exneat_cli.wiring import Geometry
@@ -25,7 +25,7 @@ class StoppedError(Exception):
     """What ends a run in these tests."""
 
 
-class Listener(run_module.Silence):
+class Listener(Progress):
     """Remembers what it is told."""
 
     def __init__(self) -> None:
@@ -64,8 +64,9 @@ def content(directory: RunDirectory) -> dict[str, str]:
 
 
 def stop_at_call(patch: pytest.MonkeyPatch, name: str, number: int) -> None:
-    """Let the `number`-th call of a function that `runs.run` uses raise `StoppedError`."""
-    original, calls = getattr(run_module, name), []
+    """Let the `number`-th call of a function that `runs.run` or `runs.champion` uses raise `StoppedError`."""
+    module = run_module if hasattr(run_module, name) else champion
+    original, calls = getattr(module, name), []
 
     def counted(*arguments: Any) -> Any:
         calls.append(name)
@@ -73,7 +74,7 @@ def stop_at_call(patch: pytest.MonkeyPatch, name: str, number: int) -> None:
             raise StoppedError
         return original(*arguments)
 
-    patch.setattr(run_module, name, counted)
+    patch.setattr(module, name, counted)
 
 
 def train_stopping(settings: RunSettings, name: str, number: int) -> None:
@@ -103,7 +104,7 @@ def test_a_run_that_stops_after_any_generation_ends_with_the_same_bytes(
         assert resumed(settings)[0] == undisturbed
 
 
-def test_linked_modules_on_ant_go_on_as_if_nothing_had_been(tmp_path: Path) -> None:
+def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     undisturbed = content(train(ant(tmp_path / "undisturbed")).directory)
     settings = ant(tmp_path / "stopped")
     train_stopping(settings, "write_checkpoint", 2)

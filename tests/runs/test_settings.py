@@ -24,7 +24,7 @@ from exneat_cli.wiring import Geometry, Wiring
         ({"geometry": Geometry("custom", (0, 1, 1, 2))}, "exneat-custom0112-none"),
     ],
 )
-def test_an_variant_is_algorithm_geometry_linkage_and_central(changes: dict[str, Any], variant: str) -> None:
+def test_a_variant_is_algorithm_geometry_linkage_and_central(changes: dict[str, Any], variant: str) -> None:
     assert RunSettings(**changes).variant == variant
 
 

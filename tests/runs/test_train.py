@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import yaml
 from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import HistoryRow, RunDirectory, read_champion
+from exneat_cli.records import RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs import training as training_module
@@ -124,17 +125,19 @@ def test_a_finished_run_is_found_not_trained_again(tmp_path: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in first.directory.path.iterdir()} == before
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_an_interrupted_run_can_be_done_again_with_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     undisturbed = train(tiny(tmp_path / "a"))
 
     def interrupt(*arguments: object) -> None:
-        raise KeyboardInterrupt
+        patch.setattr("exneat_cli.runs.run.signal_heard", lambda: signal.SIGINT)
+        raise error
 
     with monkeypatch.context() as patch:
         patch.setattr("exneat_cli.runs.run.write_history", interrupt)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(error):
             train(tiny(tmp_path / "b"))
     directory = tiny(tmp_path / "b").directory
     assert directory.read_manifest()["status"] == "interrupted"
@@ -205,23 +208,15 @@ def exploding(brains: Brains, every: int = 1) -> Brains:
 
 def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o), every=2))
-    seen: list[HistoryRow] = []
     settings = tiny(tmp_path, population=10, generations=4)
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        trained = training_module.evolve(settings, runner, lambda rows: seen.append(rows[-1]))
-    assert [row.failed_episodes for row in seen] == [5, 5, 5, 5]
-    assert all(row.best_fitness > -100.0 for row in seen)
-    assert all(np.isfinite(row).all() for row in seen)
-    assert all(entry.fitness > -100.0 for entry in trained.hall_of_fame)
-
-
-def test_failed_teams_rank_behind_sound_ones_that_are_below_the_floor() -> None:
-    told = training_module._failed_last([-150.0, -100.0, -120.0, -100.0], sound=[0, 2])
-    assert told[0] == -150.0
-    assert told[2] == -120.0
-    assert max(told[1], told[3]) < -150.0
-    assert training_module._failed_last([-100.0, 5.0], sound=[1]) == [-100.0, 5.0]
-    assert training_module._failed_last([-100.0, -100.0], sound=[]) == [-100.0, -100.0]
+        training = training_module.Training.start(settings)
+        while not training.is_over:
+            training.advance(runner)
+    assert [row["failed_episodes"] for row in training.history] == [5, 5, 5, 5]
+    assert all(row["best_fitness"] > -100.0 for row in training.history)
+    assert all(np.isfinite(list(row.values())).all() for row in training.history)
+    assert all(entry.fitness > -100.0 for entry in training.search.candidates())
 
 
 def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from configparser import ConfigParser
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,7 @@ from exneat_cli.algorithms.neat.genome import ArrayGenome
 from exneat_cli.algorithms.neat.initial_connections import INITIAL_CONNECTIONS
 from exneat_cli.algorithms.neat.reproduction import SteadyReproduction
 from exneat_cli.algorithms.neat.stock_genome import HomologousGenome
-from exneat_cli.errors import ExneatError, check_choice, check_flag, check_real, check_whole
-from exneat_cli.interruption import scratch_directory
+from exneat_cli.errors import check_choice, check_flag, check_real, check_whole
 
 GENOMES = {"array": ArrayGenome, "stock": HomologousGenome}
 
@@ -161,53 +160,47 @@ def neat_config(
         population: genomes per generation.
         shape: numbers of inputs, initial hidden nodes and outputs.
         genome_type: the genome's class, if not what the settings say.
-
-    Raises:
-        ExneatError: neat-python reads its configuration from a file only, and none could be written.
     """
-    genome_type = genome_type or GENOMES[settings.genome]
-    inputs, hidden, outputs = shape
-    sections: dict[str, dict[str, object]] = {
-        "NEAT": {
-            "fitness_criterion": "max",
-            "fitness_threshold": 0,
-            "no_fitness_termination": True,
-            "pop_size": population,
-            "reset_on_extinction": True,
-        },
-        genome_type.__name__: {
-            "num_inputs": inputs,
-            "num_hidden": hidden,
-            "num_outputs": outputs,
-            **_structure(settings),
-            **_number("weight", 0.0, settings.weight_init_stdev, settings.weight_max_value),
-            **_change(
-                "weight", settings.weight_mutate_rate, settings.weight_replace_rate, settings.weight_mutate_power
-            ),
-            **_number("bias", 0.0, settings.bias_init_stdev, settings.bias_max_value),
-            **_change("bias", settings.bias_mutate_rate, settings.bias_replace_rate, settings.bias_mutate_power),
-            **_number("response", 1.0, 0.0, 1.0),
-            **_change("response", 0.0, 0.0, 0.0),
-        },
-        "DefaultSpeciesSet": {"compatibility_threshold": settings.compatibility_threshold},
-        "DefaultStagnation": {
-            "species_fitness_func": "max",
-            "max_stagnation": settings.max_stagnation,
-            "species_elitism": settings.species_elitism,
-        },
-        SteadyReproduction.__name__: {
-            "elitism": settings.elitism,
-            "survival_threshold": settings.survival_threshold,
-            "min_species_size": settings.min_species_size,
-        },
-    }
-    config = _read_config(sections, genome_type)
+    config = neat.Config.__new__(neat.Config)  # its constructor takes nothing but a file
+    config.genome_type = genome_type or GENOMES[settings.genome]
+    config.species_set_type, config.stagnation_type = neat.DefaultSpeciesSet, neat.DefaultStagnation
+    config.reproduction_type = SteadyReproduction
+    config.config_information = config.seed = None
+    config.pop_size, config.reset_on_extinction = population, True
+    config.fitness_criterion, config.fitness_threshold, config.no_fitness_termination = "max", 0.0, True
+    config.genome_config = config.genome_type.parse_config(_as_text(_genome_items(settings, shape)))
     config.genome_config.positive_start = settings.positive_start
+    species = {"compatibility_threshold": settings.compatibility_threshold}
+    config.species_set_config = config.species_set_type.parse_config(_as_text(species))
+    stagnation = {
+        "species_fitness_func": "max",
+        "max_stagnation": settings.max_stagnation,
+        "species_elitism": settings.species_elitism,
+    }
+    config.stagnation_config = config.stagnation_type.parse_config(_as_text(stagnation))
+    reproduction = {
+        "elitism": settings.elitism,
+        "survival_threshold": settings.survival_threshold,
+        "min_species_size": settings.min_species_size,
+    }
+    config.reproduction_config = config.reproduction_type.parse_config(_as_text(reproduction))
     return config
 
 
-def _structure(settings: EvolutionSettings) -> dict[str, object]:
+def _as_text(items: Mapping[str, object]) -> dict[str, str]:
+    """The items as an INI file holds them, which is what neat-python parses."""
+    return {name: str(value) for name, value in items.items()}
+
+
+def _genome_items(settings: EvolutionSettings, shape: tuple[int, int, int]) -> dict[str, object]:
     return {
+        **dict(zip(("num_inputs", "num_hidden", "num_outputs"), shape, strict=True)),
+        **_number("weight", 0.0, settings.weight_init_stdev, settings.weight_max_value),
+        **_change("weight", settings.weight_mutate_rate, settings.weight_replace_rate, settings.weight_mutate_power),
+        **_number("bias", 0.0, settings.bias_init_stdev, settings.bias_max_value),
+        **_change("bias", settings.bias_mutate_rate, settings.bias_replace_rate, settings.bias_mutate_power),
+        **_number("response", 1.0, 0.0, 1.0),
+        **_change("response", 0.0, 0.0, 0.0),
         "feed_forward": settings.feed_forward,
         "initial_connection": settings.initial_connection,
         # neat-python 2.0 takes its default, the string "false", for true.
@@ -240,18 +233,3 @@ def _number(name: str, mean: float, sd: float, bound: float) -> dict[str, object
 
 def _change(name: str, rate: float, replace: float, power: float) -> dict[str, object]:
     return {f"{name}_mutate_rate": rate, f"{name}_replace_rate": replace, f"{name}_mutate_power": power}
-
-
-def _read_config(sections: dict[str, dict[str, object]], genome_type: type[Any]) -> neat.Config:
-    parser = ConfigParser()
-    parser.read_dict(sections)
-    try:
-        with scratch_directory() as directory:
-            path = directory / "neat.ini"
-            with path.open("w", encoding="utf-8") as file:
-                parser.write(file)
-            kinds = (SteadyReproduction, neat.DefaultSpeciesSet, neat.DefaultStagnation)
-            return neat.Config(genome_type, *kinds, str(path))
-    except OSError as error:
-        why = f"a temporary file of neat-python's configuration could not be written: {error.strerror}"
-        raise ExneatError(f"{why}\n  check the disk, or set TMPDIR to a directory with room") from error
