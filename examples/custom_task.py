@@ -56,11 +56,6 @@ def step(world: World, action: NDArray[np.float64], terms: NDArray[np.float64]) 
     return ENDED if over else RUNNING
 
 
-def locate(world: World, row: NDArray[np.float64]) -> None:
-    """Write where the agent is, x ahead and y to the left of the middle: what the picture of its path shows."""
-    row[:] = 0.0, len(world.light) // 2 - world.agent[0]
-
-
 @dataclass(frozen=True)
 class Corridor(Task):
     """Parameters of the corridor.
@@ -77,7 +72,6 @@ class Corridor(Task):
     length: int = 9
 
     terms: ClassVar[tuple[str, ...]] = ("brightness",)
-    trace_columns: ClassVar[tuple[str, ...]] = ("x", "y")
     observation_size: ClassVar[int] = 2
     actuator_names: ClassVar[tuple[str, ...]] = ("left", "right")
     parts: ClassVar[tuple[Part, ...]] = (
@@ -98,7 +92,7 @@ class Corridor(Task):
     def open(self, *, training: bool) -> Simulation:
         """Open a new corridor."""
         world = World(light=np.zeros(self.length), agent=np.zeros(2, np.int64))
-        return Simulation(world, reset, rewind, observe, step, locate, compiled=False)
+        return Simulation(world, reset, rewind, observe, step, compiled=False)
 
 
 TASKS["corridor"] = Corridor
