@@ -65,17 +65,17 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, _nrt=True)
 
 
-def compiled_lean(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same for what runs at every step: made part of its caller, and allocates nothing.
+def compiled_lean(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:
+    """The same for what runs at every step: made part of its caller, and allocates nothing; `cache` may be left out.
 
     Passing tuples of arrays to a function and counting references to them costs several times as much as
     what a step of a grid world does. Code that allocates nothing can leave out the counting.
     """
-    return _compiled(function, forceinline=True, _nrt=False)
+    return _compiled(function, cache=cache, forceinline=True, _nrt=False)
 
 
-def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
-    directory = cache_directory()
+def _compiled(function: Callable[..., Any], *, cache: bool = True, **options: Any) -> Callable[..., Any]:
+    directory = cache_directory() if cache else None
     with _CACHE_SET_UP:
         return _compiled_into(directory, function, options)
 
