@@ -1,27 +1,38 @@
-"""Robustness: one brain in the same episodes, while one setting goes through a list of levels.
-
-A perturbation is a setting of the task or of the noise, the very ones that training uses.
-"""
+"""What disturbs an agent: one layer for training and testing, and sweeps of one of its settings."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from exneat_cli.brains import Brain, RandomActions
-from exneat_cli.errors import ConfigError, is_finite
-from exneat_cli.rollouts.executor import Executor
-from exneat_cli.rollouts.noise import Noise
-from exneat_cli.rollouts.outcomes import Outcomes
-from exneat_cli.rollouts.runner import Runner
-from exneat_cli.seeding import EpisodeSeeds
+from exneat_cli.errors import ConfigError, check_real, is_finite
 from exneat_cli.tasks import HasInitialPose, Task
 
 
 @dataclass(frozen=True)
+class Noise:
+    """What disturbs the agent.
+
+    Attributes:
+        sensor_std: sd of the normal noise on every reading at every step, in the reading's own unit.
+        reset_scale: size of the noise on the initial pose, uniform on positions (rad, m) and normal on
+            velocities (rad/s, m/s); 0.1 is the default of Gymnasium's Ant.
+
+    Raises:
+        ConfigError: a value is negative or not finite.
+    """
+
+    sensor_std: float = 0.0
+    reset_scale: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_real("noise.sensor_std", self.sensor_std, 0.0)
+        check_real("noise.reset_scale", self.reset_scale, 0.0)
+
+
+@dataclass(frozen=True)
 class Sweep:
-    """A setting and the levels that it goes through.
+    """A setting of the task or of the noise, the very ones that training uses, and the levels that it goes through.
 
     Attributes:
         name: e.g. ``sensor_noise``.
@@ -48,7 +59,7 @@ class Sweep:
 
 
 def perturbed(task: Task, noise: Noise, sweep: Sweep, level: float) -> tuple[Task, Noise]:
-    """Task and noise with one setting at another level.
+    """Task and noise with the sweep's setting at another level.
 
     Raises:
         ConfigError: the task has no such setting, or it refuses the level.
@@ -61,30 +72,3 @@ def perturbed(task: Task, noise: Noise, sweep: Sweep, level: float) -> tuple[Tas
         raise ConfigError("sweep", f"a sweep that fits task={task.name}", sweep.name, "it has no initial pose")
     changed = dataclasses.replace(part, **{name: level})  # type: ignore[type-var]
     return (changed, noise) if section == "task" else (task, changed)  # type: ignore[return-value]
-
-
-def run_levels(
-    acting: Sequence[Brain] | RandomActions,
-    task: Task,
-    noise: Noise,
-    sweep: Sweep,
-    executor: Executor,
-    episodes: Sequence[EpisodeSeeds],
-) -> Iterator[tuple[float, Outcomes]]:
-    """Each level with what came out of the episodes, which have no early stopping.
-
-    Args:
-        acting: see `Runner.run`.
-        task: as it was trained.
-        noise: as it was trained.
-        sweep: what changes.
-        executor: where episodes run.
-        episodes: the same at every level.
-
-    Raises:
-        ConfigError: the task refuses a level; before anything was run.
-    """
-    settings = [perturbed(task, noise, sweep, level) for level in sweep.levels]
-    for level, (changed_task, changed_noise) in zip(sweep.levels, settings, strict=True):
-        with Runner(changed_task, changed_noise, executor, training=False) as runner:
-            yield level, runner.run(acting, episodes)
