@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 
 from exneat_cli import __version__
-from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import heeding, listen, listening, stop_listening, tell_how_to_go_on
+from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.interruption import heeding, listening, stop_listening, tell_how_to_go_on
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -19,20 +19,9 @@ COMMANDS = {
     "evaluate": "test finished runs under perturbations",
     "report": "make tables, figures and a page of them from the runs there are",
     "inspect": "show a run's wiring, or list the runs",
-    "doctor": "say whether this machine is fit for exneat, and what to fix",
+    "doctor": "say whether this machine is fit for exneat, and how to fix what is not",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
-
-USAGE = {
-    "sweep": "usage: exneat sweep experiment=<name or file.yaml> [budget=paper|quick|smoke] [key=value ...]\n"
-    "  every setting of exneat train is one of all runs here; hydra/launcher=joblib runs them side by side",
-    "report": "usage: exneat report [budget=paper|quick|smoke] [only=figure-4.3] [experiment=<name or file.yaml>]\n"
-    "  [axis=generation|episodes|env_steps] [output=<root of runs, outputs by default>]",
-    "inspect": "usage: exneat inspect [run=<run directory>] [output=<root of runs, outputs by default>]",
-    "doctor": "usage: exneat doctor [output=<root of runs, outputs by default>]\n"
-    "  each line is ok, degraded (works, but slower or in part) or broken; exit code 1 if anything is broken",
-}
-"""What --help prints for the commands that Hydra does not answer for."""
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
@@ -46,7 +35,9 @@ usage: exneat <command> [key=value ...]
   exneat train task=ant geometry=all            one run of ExNEAT on Ant
   exneat train task=ant algorithm=neat seed=3   the same task for NEAT
   exneat train -m seed=0,1,2 noise.sensor_std=0,0.1
-  exneat train --help                           every setting with its default
+  exneat train --help                           every setting with its default; the same for the other commands
+  exneat train --cfg job task=hunting           what these settings come to, without training
+  exneat train --config-dir mine task=own       mine/task/own.yaml is a task of your own
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
   exneat report                                 outputs/report/index.html
@@ -56,17 +47,15 @@ usage: exneat <command> [key=value ...]
 """
 
 
-def _printable(message: str) -> str:
-    """The message with control characters spelled out: what a stranger wrote must not steer the terminal."""
-    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in message)
-
-
 def program() -> int:
     """What the installed program calls: as `main`, but a late signal changes nothing any more."""
-    listen()
-    code = _answer(sys.argv[1:])
+    code = main()
     stop_listening()
-    _drop_what_nobody_reads()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:  # a closed pipe: Python would complain at its end, with another exit code
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return code
 
 
@@ -78,52 +67,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: without the program's name; None takes the process's own.
     """
-    with listening():
-        return _answer(sys.argv[1:] if arguments is None else arguments)
-
-
-def _answer(arguments: Sequence[str]) -> int:
-    try:
-        return _answer_unless_interrupted(arguments)
-    except KeyboardInterrupt as interrupt:
-        tell_how_to_go_on()
-        return 128 + getattr(interrupt, "number", signal.SIGINT)
-
-
-def _answer_unless_interrupted(arguments: Sequence[str]) -> int:
-    command, *rest = list(arguments) or ["--help"]
+    command, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
         print(HELP.format(commands="\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())), end="")
         return 0
     if command in ("-V", "--version"):
         print(f"exneat {__version__}")
         return 0
-    try:
-        if command not in COMMANDS:
-            raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
-        if rest in (["--help"], ["-h"]) and command in USAGE:
-            print(USAGE[command])
-            return 0
-        with heeding():
-            code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(rest)
-        return code
-    except ExneatError as error:
-        print(f"exneat: {_printable(str(error))}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:
-        return 0
-    except OSError as error:
-        if error.errno not in _NO_ROOM:
-            raise
-        where = error.filename or "temporary files or the program's own output"
-        print(f"exneat: {where}: {error.strerror}; check the disk, output= and TMPDIR", file=sys.stderr)
-        return 2
-
-
-def _drop_what_nobody_reads() -> None:
-    """Python would complain at its end, with another exit code, of output that a closed pipe does not take."""
-    for stream in (sys.stdout, sys.stderr):
+    with listening():
         try:
-            stream.flush()
-        except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            with heeding():
+                check_choice("command", command, list(COMMANDS))
+                line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
+                if line.shown:
+                    print(line.show())
+                    return 0
+                code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(line)
+                return code
+        except KeyboardInterrupt as interrupt:
+            tell_how_to_go_on()
+            return 128 + getattr(interrupt, "number", signal.SIGINT)
+        except ExneatError as error:
+            return _refuse(str(error))
+        except ImportError as error:
+            return _refuse(f"{error}\n  python -m pip check says which libraries are missing or of another version")
+        except BrokenPipeError:
+            return 0
+        except OSError as error:
+            if error.errno not in _NO_ROOM:
+                raise
+            where = error.filename or "temporary files or the program's own output"
+            return _refuse(f"{where}: {error.strerror}; check the disk, output= and TMPDIR")
+
+
+def _refuse(message: str) -> int:
+    """Print the message, and return the exit code; what a stranger wrote must not steer the terminal."""
+    printable = "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in message)
+    print(f"exneat: {printable}", file=sys.stderr)
+    return 2

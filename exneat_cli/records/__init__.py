@@ -1,6 +1,6 @@
 """Everything on disk: layout, columns, champions, checkpoints, manifests, locks."""
 
-from exneat_cli.records import disk, provenance
+from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, read_champion, write_champion, write_hall_of_fame
 from exneat_cli.records.champion_data import plan_from_data, read_champion_data
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
@@ -8,6 +8,7 @@ from exneat_cli.records.files import make_directory, read_json, write_csv, write
 from exneat_cli.records.history import HISTORY_COLUMNS, HistoryRow, write_history
 from exneat_cli.records.locks import is_held
 from exneat_cli.records.manifest_data import DONE, FAILED, INTERRUPTED, RUNNING
+from exneat_cli.records.plain import build
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import (
     MANIFEST_FORMAT,
@@ -16,7 +17,7 @@ from exneat_cli.records.run_directory import (
     configuration_hash,
     find_runs,
 )
-from exneat_cli.records.yaml_files import check_yaml, read_yaml
+from exneat_cli.records.yaml_files import read_yaml
 
 __all__ = [
     "DONE",
@@ -32,9 +33,8 @@ __all__ = [
     "HistoryRow",
     "RobustnessRow",
     "RunDirectory",
-    "check_yaml",
+    "build",
     "configuration_hash",
-    "disk",
     "find_runs",
     "is_held",
     "make_directory",

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
-import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole, shortened
-from exneat_cli.records import RunDirectory, configuration_hash
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_section, check_text, check_whole
+from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
-_Part = TypeVar("_Part")
 
 
 @dataclass(frozen=True)
@@ -81,8 +78,7 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
-        if not isinstance(self.output, str) or not self.output or not self.output.isprintable():
-            raise ConfigError("output", "a directory, without control characters", self.output)
+        check_text("output", self.output, "a directory")
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
@@ -151,42 +147,17 @@ class RunSettings:
             "evolution": EvolutionSettings,
             "executor": Executor,
         }
-        task = _section("task", plain.get("task", {}))
+        task = check_section("task", plain.get("task", {}))
         check_choice("task.name", task.get("name"), list(TASKS))
         values: dict[str, Any] = dict(plain)
-        values["task"] = _build(TASKS[task["name"]], task, "task.")
-        values["algorithm"] = _algorithm(_section("algorithm", plain.get("algorithm", {"name": "exneat"})))
+        values["task"] = build(TASKS[task["name"]], task, "task.")
+        values["algorithm"] = _algorithm(check_section("algorithm", plain.get("algorithm", {"name": "exneat"})))
         for key, part in parts.items():
             if key in values:
-                values[key] = _build(part, _section(key, values[key]), f"{key}.")
-        return _build(cls, values, "")
+                values[key] = build(part, values[key], f"{key}.")
+        return build(cls, values, "")
 
 
 def _algorithm(values: Mapping[str, Any]) -> Algorithm:
     check_choice("algorithm", values.get("name"), list(ALGORITHMS))
-    return _build(ALGORITHMS[values["name"]], values, "algorithm.")
-
-
-def executor_from(plain: object) -> Executor:
-    """An executor from plain data.
-
-    Raises:
-        ConfigError: a key is unknown, or a value has the wrong type or range.
-    """
-    return _build(Executor, _section("executor", plain), "executor.")
-
-
-def _section(key: str, value: object) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError(key, "a section with keys of its own", value)
-    return value
-
-
-def _build(part: type[_Part], values: Mapping[str, Any], prefix: str) -> _Part:
-    known = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
-    for key in values:
-        if key not in known:
-            close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
-            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
-            raise ExneatError(f"{prefix}{key}: unknown key (value {shortened(values[key])})\n  {hint}")
-    return part(**values)
+    return build(ALGORITHMS[values["name"]], values, "algorithm.")
