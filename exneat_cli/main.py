@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from exneat_cli import __version__
-from exneat_cli.errors import ExneatError, check_choice
+from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import heeding, listening, stop_listening, tell_how_to_go_on
 
 COMMANDS = {
@@ -77,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with listening():
         try:
             with heeding():
-                check_choice("command", command, list(COMMANDS))
+                if command not in COMMANDS:
+                    raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
                 line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
                 if line.shown:
                     print(line.show())

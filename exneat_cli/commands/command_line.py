@@ -13,7 +13,7 @@ import difflib
 import itertools
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,13 @@ import hydra
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, Quote, QuotedString
-from hydra.errors import HydraException, MissingConfigException
+from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
+from omegaconf.errors import OmegaConfBaseException
 
 import exneat_cli
-from exneat_cli.errors import ConfigError, ExneatError, check_keys
+from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.errors import ConfigError, ExneatError
 
 PRIMARY = {"train": "config"}
 """What a command's composition starts from in conf/, where the file is not called like the command."""
@@ -46,7 +47,7 @@ class CommandLine:
     Attributes:
         words: all of it, and ``exneat`` before, for manifests.
         primary: the YAML file that the composition starts from, if from any.
-        directories: where YAML files are looked for; a user's own come first.
+        directories: where YAML files are looked for, in this order.
         settings: key=value, as Hydra's composition takes them.
         launcher: the same for Hydra's launcher.
         multirun: whether settings with several values are to be gone through.
@@ -61,15 +62,18 @@ class CommandLine:
     multirun: bool
     shown: str
 
-    def compose(self) -> dict[str, Any]:
+    def compose(self, *keys: str) -> dict[str, Any]:
         """Compose the settings with the YAML files, as dicts, lists, numbers and strings.
+
+        Args:
+            keys: those that are wanted; without any, all are.
 
         Raises:
             ExneatError: they do not fit together, or a value refers to something that is not there.
         """
         with self.composed() as config:
             try:
-                own = OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"])
+                own = OmegaConf.masked_copy(config, list(keys) or [str(key) for key in config if key != "hydra"])
                 plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
             except OmegaConfBaseException as error:
                 raise ExneatError(in_words(error, self.directories)) from error
@@ -93,23 +97,6 @@ class CommandLine:
                 raise ExneatError(in_words(error, self.directories)) from error
             yield config
 
-    def with_settings(self, settings: Iterable[str]) -> CommandLine:
-        """The same with other settings."""
-        return replace(self, settings=tuple(settings))
-
-    def apart(self, keys: Sequence[str], others: Sequence[str]) -> tuple[CommandLine, CommandLine]:
-        """The same with the settings of these keys alone, and with the others alone.
-
-        Raises:
-            ExneatError: a key is among neither, and no group of YAML files.
-        """
-        named = [(text.lstrip("+").partition("=")[0], text) for text in self.settings]
-        for section, text in ((key.partition(".")[0], text) for key, text in named):
-            if not any((directory / section).is_dir() for directory in self.directories):
-                check_keys("", {section: text.partition("=")[2]}, (*keys, *others))
-        own = self.with_settings(text for key, text in named if key in keys)
-        return own, self.with_settings(text for key, text in named if key not in keys)
-
     def combinations(self) -> dict[str, CommandLine]:
         """Each combination of the settings that have several values, by those values."""
         choices = []
@@ -119,7 +106,7 @@ class CommandLine:
             choices.append([f"{override.get_key_element()}={value}" for value in values] or [text])
         varied = [k for k, texts in enumerate(choices) if len(texts) > 1]
         return {
-            " ".join(texts[k].lstrip("+") for k in varied): self.with_settings(texts)
+            " ".join(texts[k].lstrip("+") for k in varied): replace(self, settings=texts)
             for texts in itertools.product(*choices)
         }
 
@@ -129,9 +116,10 @@ class CommandLine:
             return yaml.safe_dump(self.compose(), sort_keys=False, allow_unicode=True).rstrip()
         with self.composed() as config:
             choices = dict(reversed(config.hydra.runtime.choices.items()))
+        settings = {"config": "\n"} if "task" in choices else {}
         chosen = {f"{group}/{option}": f"\n# {group}={option}\n" for group, option in choices.items()}
         parts = []
-        for name, title in {str(self.primary): "", **chosen}.items():
+        for name, title in {**settings, str(self.primary): "", **chosen}.items():
             paths = [directory / f"{name}.yaml" for directory in self.directories]
             text = next((path.read_text(encoding="utf-8") for path in paths if path.exists()), "")
             parts.append(title + text.removeprefix("# @package _global_\n") if text else "")
@@ -171,7 +159,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
         raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
-    directories = (*flags.directories, shipped_directory("conf"))
+    directories = _search_path(flags.config_path, flags.config_dir)
     read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
     return CommandLine(
         words=("exneat", command, *arguments),
@@ -188,8 +176,8 @@ def _flag_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     parser.add_argument("-h", "--help", action="store_true")
     parser.add_argument("-m", "--multirun", action="store_true")
-    places: dict[str, Any] = {"dest": "directories", "action": "append", "default": [], "type": _directory}
-    parser.add_argument("-cd", "--config-dir", "-cp", "--config-path", **places)
+    parser.add_argument("-cd", "--config-dir", action="append", default=[], type=_directory)
+    parser.add_argument("-cp", "--config-path", type=_directory)
     parser.add_argument("-cn", "--config-name")
     parser.add_argument("-c", "--cfg", choices=["job"])
     parser.add_argument("settings", nargs="*")
@@ -204,8 +192,20 @@ def _flag_parser() -> argparse.ArgumentParser:
 def _directory(text: str) -> Path:
     directory = Path(text).expanduser().absolute()
     if not directory.is_dir():
-        raise ConfigError("--config-dir", "a directory with YAML files", text)
+        came = "a file" if directory.exists() else "nothing"
+        raise ExneatError(f"{text}: expected a directory with YAML files, got {came}")
     return directory
+
+
+def _search_path(start: Path | None, own: Sequence[Path]) -> tuple[Path, ...]:
+    """Where YAML files are looked for, in this order: where the composition starts, exneat's own, and a user's own."""
+    shipped = shipped_directory("conf")
+    for directory in own:
+        for path in directory.rglob("*.yaml"):
+            name = path.relative_to(directory)
+            if (shipped / name).exists():
+                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+    return (*([] if start is None else [start]), shipped, *own)
 
 
 def _is_hydras(text: str) -> bool:
@@ -218,12 +218,12 @@ def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = Fal
     Raises:
         ExneatError: it cannot be read, is not the user's to make, or has several values unless in a multirun.
     """
-    text, override = _parsed(text)
+    readable, override = _parsed(text)
     key = override.key_or_group
     if not key:
         raise ExneatError(f"{text}: expected key=value, got no key")
     if override.is_delete():
-        raise ExneatError(f"{text}: a setting cannot be deleted\n  leave it out, or give it the value you want")
+        raise ExneatError(f"{text}: a setting cannot be deleted; leave it out, or give it the value you want")
     if override.is_sweep_override() and not (multirun and override.is_discrete_sweep() and not _is_hydras(key)):
         raise ExneatError(
             f"{text}: expected one value, got several\n"
@@ -234,55 +234,23 @@ def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = Fal
         if not name.startswith(_OF_LAUNCHERS):
             fix = "hydra/launcher=, hydra.launcher.* and hydra.sweep.dir= are yours to set, output= says where runs go"
             raise ExneatError(f"{text}: exneat sets hydra.{name} itself\n  {fix}")
-        return text
-    if any((directory / key).is_dir() for directory in directories):
-        _check_option(key, override)
-        return text
-    return f"++{text.lstrip('+')}"
+        return readable
+    if not any((directory / key).is_dir() for directory in directories):
+        return f"++{readable.lstrip('+')}"
+    if not override.is_sweep_override():
+        value = override.value()
+        if isinstance(value, list) and key not in _OF_LISTS:
+            raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
+        if not isinstance(value, str | list):
+            raise ConfigError(key, "the name of an option", value)
+    return readable
 
 
 def _parsed(text: str) -> tuple[str, Override]:
+    """A setting that Hydra's grammar reads, and what it reads."""
     parser = OverridesParser.create()
-    try:
-        return text, parser.parse_override(text)
-    except HydraException:
-        key, separator, value = text.partition("=")
-        as_text = f"{key}={quoted(os.path.expanduser(value))}"
-        try:
-            if separator:
-                return as_text, parser.parse_override(as_text)
-        except HydraException:
-            pass
+    key, separator, value = text.partition("=")
+    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else ():
+        with contextlib.suppress(HydraException):
+            return readable, parser.parse_override(readable)
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")
-
-
-def _check_option(group: str, override: Override) -> None:
-    value = None if override.is_sweep_override() else override.value()
-    if isinstance(value, list) and group not in _OF_LISTS:
-        raise ConfigError(group, "one option", value, f"exneat train -m {group}=... goes through several")
-    if not override.is_sweep_override() and not isinstance(value, str | list | dict):
-        raise ConfigError(group, "the name of an option", value)
-
-
-def in_words(error: BaseException, directories: Sequence[Path]) -> str:
-    """Say in one or two lines what Hydra, OmegaConf or YAML found wrong.
-
-    Args:
-        error: what they raised.
-        directories: whose options are listed where one does not exist.
-    """
-    error = error if str(error) else error.__cause__ or error
-    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
-        group, _, option = str(error.missing_cfg_file).rpartition("/")
-        files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
-        known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
-        return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
-    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
-        return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: expected YAML, got {error.problem}"
-    if isinstance(error, RecursionError):
-        return "a YAML file leads back to itself through its defaults, or values do through ${...}"
-    cause = error.__cause__
-    if isinstance(cause, ConfigKeyError | ConfigAttributeError) and cause.parent_node is not None:
-        return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
-    first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
-    return f"{error.full_key}: {first}" if getattr(error, "full_key", None) else first

@@ -19,9 +19,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
+
+if TYPE_CHECKING:
+    from exneat_cli.records import RunDirectory
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -100,8 +104,7 @@ def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
         ("compiled MuJoCo", lambda: said_by(["-c", _PHYSICS]), BROKEN, f"{install}; unset NUMBA_DISABLE_JIT"),
         ("rendering", _rendering, DEGRADED, egl),
         ("compile cache", _cache, DEGRADED, "set NUMBA_CACHE_DIR to a directory that you can write to"),
-        ("output root", lambda: _writing(output), BROKEN, place),
-        ("locks", lambda: _locks(output), DEGRADED, f"{place}, or never start one run twice"),
+        ("output root", lambda: _output(output), BROKEN, place),
         ("memory", _memory, DEGRADED, "close other programs, or do one run at a time"),
         ("disk space", lambda: _disk_space(output), DEGRADED, "make room, or set output= to another disk"),
     ]
@@ -176,31 +179,20 @@ def _cache() -> str:
         return f"{directory} can be written"
 
 
-def _writing(output: Path) -> str:
-    with _trial(output):
-        return f"output={output} can be {'written' if output.is_dir() else 'made'}"
-
-
-def _locks(output: Path) -> str:
-    from exneat_cli.records import RunDirectory
-
-    with _trial(output) as trial, RunDirectory(trial).held():
-        try:
-            with RunDirectory(trial).held():
-                pass
-        except ExneatError:
-            return "a second process is kept out of a run directory"
-    raise ExneatError(f"output={output}: the file system grants a lock twice")
+def _output(output: Path) -> str:
+    with _trial(output) as run, run.held(), contextlib.suppress(ExneatError), run.held():
+        raise OSError(f"output={output}: the file system grants a lock twice")
+    return f"output={output} can be {'written' if output.is_dir() else 'made'}, and keeps a second process out"
 
 
 @contextlib.contextmanager
-def _trial(place: Path) -> Iterator[Path]:
+def _trial(place: Path) -> Iterator[RunDirectory]:
     """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
-    from exneat_cli.records import write_whole
+    from exneat_cli.records import RunDirectory, write_whole
 
     with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=_nearest(place)) as name:
         write_whole(Path(name) / "trial", b"written by exneat doctor\n")
-        yield Path(name)
+        yield RunDirectory(Path(name))
 
 
 def _nearest(place: Path) -> Path:

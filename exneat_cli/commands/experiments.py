@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
+from exneat_cli.commands.command_line import CommandLine, as_written, read_setting, shipped_directory
+from exneat_cli.commands.hydra_messages import in_words
 from exneat_cli.commands.jobs import BUDGETS, Job, read_job
 from exneat_cli.errors import (
     ConfigError,
@@ -54,7 +55,7 @@ class Condition:
 
     label: str
     settings: Mapping[str, Any]
-    sweeps: list[str] | None = None
+    sweeps: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def read_experiment(name: object) -> Experiment:
     except OSError as error:
         raise ExneatError(f"{path}: could not be read: {error.strerror or error}") from error
     except (ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
-        raise ExneatError(in_words(error, ())) from error
+        raise ExneatError(in_words(error, [path.parent])) from error
     try:
         return _experiment(path.stem, content)
     except ExneatError as error:
@@ -141,10 +142,9 @@ def _variant(key: str, entry: Any) -> Variant:
 def _condition(key: str, entry: Any) -> Condition:
     condition = build(Condition, entry, f"{key}.")
     check_text(f"{key}.label", condition.label)
-    sweeps = condition.sweeps or []
-    if not isinstance(sweeps, list) or not all(isinstance(sweep, str) for sweep in sweeps):
-        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", sweeps)
-    return replace(condition, settings=_flat(f"{key}.settings", condition.settings), sweeps=sweeps)
+    if not isinstance(condition.sweeps, list) or not all(isinstance(sweep, str) for sweep in condition.sweeps):
+        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", condition.sweeps)
+    return replace(condition, settings=_flat(f"{key}.settings", condition.settings))
 
 
 def _flat(key: str, values: Any) -> dict[str, Any]:
@@ -153,20 +153,19 @@ def _flat(key: str, values: Any) -> dict[str, Any]:
     for name, value in check_section(key, values).items():
         if re.split("[./]", str(name).lstrip("+~"))[0] in _SET_HERE:
             raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
-        if isinstance(value, Mapping):
-            flat.update({f"{name}.{inner}": each for inner, each in _flat(f"{key}.{name}", value).items()})
-        else:
-            flat[str(name)] = value
+        inner = _flat(f"{key}.{name}", value) if isinstance(value, Mapping) else {"": value}
+        flat.update({f"{name}.{rest}".rstrip("."): each for rest, each in inner.items()})
     return flat
 
 
-def plan_jobs(experiment: Experiment, budget: str, line: CommandLine) -> list[Job]:
+def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
     """Plan every run of an experiment, condition by condition and variant by variant.
 
     Args:
         experiment: what is compared.
         budget: ``paper``, ``quick`` or ``smoke``.
         line: its settings are the user's own for all runs, and win.
+        others: those that are none of the runs.
 
     Returns:
         Jobs that are called ``<condition>/<variant>/<seed>``.
@@ -180,7 +179,7 @@ def plan_jobs(experiment: Experiment, budget: str, line: CommandLine) -> list[Jo
     for condition in experiment.conditions:
         for variant in experiment.variants:
             try:
-                jobs += _jobs(experiment, condition, variant, budget, line)
+                jobs += _jobs(experiment, condition, variant, budget, line, others)
             except ExneatError as error:
                 raise ExneatError(f"{experiment.name}, {condition}, {variant}: {error}") from error
     places: dict[Path, Job] = {}
@@ -191,18 +190,20 @@ def plan_jobs(experiment: Experiment, budget: str, line: CommandLine) -> list[Jo
     return jobs
 
 
-def _jobs(experiment: Experiment, condition: str, variant: str, budget: str, line: CommandLine) -> Iterable[Job]:
+def _jobs(
+    experiment: Experiment, condition: str, variant: str, budget: str, line: CommandLine, others: Sequence[str]
+) -> Iterable[Job]:
     chosen, where = experiment.variants[variant], experiment.conditions[condition]
     settings = {
         **experiment.settings,
         **where.settings,
         **chosen.settings,
-        "budget": budget,
         "sweep": (where.sweeps if chosen.swept else None) or "none",
         "name": f"{experiment.name}-{condition}-{budget}",
     }
     texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
-    first = read_job("", replace(line, primary="config", settings=(*texts, *line.settings)).compose())
+    composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
+    first = read_job("", composed, others)
     for k in range(chosen.runs or experiment.runs[budget]):
         seeded = replace(first.settings, seed=first.settings.seed + k)
         yield Job(f"{condition}/{variant}/{seeded.seed}", seeded, first.sweeps)

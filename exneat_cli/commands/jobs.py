@@ -14,8 +14,9 @@ from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_fi
 
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
-KEYS = (*(f.name for f in dataclasses.fields(RunSettings)), "budget", "budgets", "sweep", "sweeps")
-"""What a composed configuration of a run consists of."""
+_SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings))
+_NO_SETTINGS = ("budget", "budgets", "sweep", "sweeps")
+"""What a composed configuration holds besides settings of the run."""
 _SPENT = ("generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes")
 
 
@@ -72,18 +73,22 @@ class Job:
         return finished
 
 
-def read_job(name: str, plain: Mapping[str, Any]) -> Job:
+def read_job(name: str, plain: Mapping[str, Any], others: Sequence[str] = ()) -> Job:
     """Check a composed configuration, and make dataclasses of it.
+
+    Args:
+        name: of the job.
+        plain: the configuration.
+        others: keys in it that are no settings of the run.
 
     Raises:
         ExneatError: a key is unknown or missing, a value is of the wrong type or out of range, or a sweep does not fit.
     """
-    check_keys("", plain, KEYS)
+    check_keys("", plain, (*_SETTINGS, *_NO_SETTINGS, *others))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)
         check_keys(f"budgets.{budget}.", check_section(f"budgets.{budget}", spent), _SPENT)
-    not_settings = ("budget", "budgets", "sweep", "sweeps")
-    settings = RunSettings.from_plain({key: value for key, value in plain.items() if key not in not_settings})
+    settings = RunSettings.from_plain({key: plain[key] for key in _SETTINGS if key in plain})
     return Job(name, settings, read_sweeps(plain, settings))
 
 
@@ -160,13 +165,12 @@ def draw_what_is_missing(directory: RunDirectory, fitness_name: str, labels: Map
         return
     from exneat_cli.analysis import draw_network, draw_path, draw_robustness, draw_training
 
+    draw = {
+        "training": lambda: draw_training(directory, fitness_name),
+        "path": lambda: draw_path(directory),
+        "network": lambda: draw_network(directory),
+        "robustness": lambda: draw_robustness(directory, labels, fitness_name),
+    }
     with directory.held():  # nobody may change the data between reading and drawing
-        missing = missing_figures(directory, swept=bool(labels))
-        if "training" in missing:
-            draw_training(directory, fitness_name)
-        if "path" in missing:
-            draw_path(directory)
-        if "network" in missing:
-            draw_network(directory)
-        if "robustness" in missing:
-            draw_robustness(directory, labels, fitness_name)
+        for name in missing_figures(directory, swept=bool(labels)):
+            draw[name]()

@@ -15,14 +15,15 @@ from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_table
-from exneat_cli.commands.command_line import CommandLine, as_written, shipped_directory
+from exneat_cli.commands.command_line import CommandLine, shipped_directory
 from exneat_cli.commands.experiments import Experiment, experiment_names, plan_jobs, read_experiment
-from exneat_cli.commands.jobs import BUDGETS, KEYS, Job
+from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.errors import ExneatError, check_choice, check_text
 from exneat_cli.records import DONE, RunDirectory, build
 from exneat_cli.tasks import HasFullReward
 
-_OWN = ("experiment", "budget", "only", "axis", "output")
+_OWN = ("experiment", "only", "axis")
+"""Settings of the report that are none of its runs."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +61,14 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, there are no runs, or the one thing asked for lacks runs.
     """
-    own, others = line.apart(_OWN, KEYS)
-    request = build(Request, own.compose(), "")
+    request = build(Request, line.compose("budget", "output", *_OWN), "")
     experiment = None if request.experiment is None else read_experiment(request.experiment)
     artefacts = _artefacts(request, experiment)
     names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})
     experiments = {name: read_experiment(name) for name in names if experiment is None or name != experiment.name}
     if experiment is not None:
         experiments[experiment.name] = experiment
-    runs = others.with_settings([*others.settings, f"++output={as_written(request.output)}"])
-    studies = {name: _study(experiments[name], request, runs) for name in names}
+    studies = {name: _study(experiments[name], request, line) for name in names}
     if not any(study.finished for study in studies.values()):
         where = f"output={request.output}: no finished run of {', '.join(names)}"
         raise ExneatError(f"{where}\n  {next(iter(studies.values())).command}")
@@ -112,16 +111,16 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
     return [part.experiment for part in parts]  # type: ignore[attr-defined]
 
 
-def _study(experiment: Experiment, request: Request, runs: CommandLine) -> Study:
+def _study(experiment: Experiment, request: Request, line: CommandLine) -> Study:
     budget = request.budget or _largest_budget(experiment, request.output)
-    jobs = plan_jobs(experiment, budget, runs)
+    jobs = plan_jobs(experiment, budget, line, _OWN)
     task = jobs[0].settings.task
     swept = [job for job in jobs if job.sweeps.sweeps]
     return Study(
         experiment=experiment.name,
         budget=budget,
         claim=experiment.claim,
-        command=_sweep_command(experiment, request, runs, budget),
+        command=_sweep_command(experiment, request, line, budget),
         fitness_name=task.fitness_name,
         has_full_reward=isinstance(task, HasFullReward),
         variants={name: variant.label for name, variant in experiment.variants.items()},
@@ -145,12 +144,12 @@ def _planned(job: Job) -> PlannedRun:
     return PlannedRun(*_place(job), settings.seed, settings.directory, settings.trained_generations)
 
 
-def _sweep_command(experiment: Experiment, request: Request, runs: CommandLine, budget: str) -> str:
+def _sweep_command(experiment: Experiment, request: Request, line: CommandLine, budget: str) -> str:
     """The command line that does what is missing."""
     is_own = request.experiment is not None and Path(request.experiment).stem == experiment.name
     name = request.experiment if is_own else experiment.name
     places = [] if request.output == "outputs" else [f"output={request.output}"]
-    others = [word for word in runs.words[2:] if word.partition("=")[0] not in _OWN]
+    others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
     return shlex.join(["exneat", "sweep", f"experiment={name}", f"budget={budget}", *places, *others])
 
 

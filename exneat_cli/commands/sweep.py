@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.experiments import plan_jobs, read_experiment
-from exneat_cli.commands.jobs import KEYS, Job
+from exneat_cli.commands.jobs import Job
 from exneat_cli.commands.launching import run_jobs
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.records import DONE
@@ -22,12 +22,11 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: the experiment or a setting makes no sense; nothing was run then.
     """
-    own, others = line.apart(("experiment", "budget"), KEYS)
-    asked = own.compose()
+    asked = line.compose("experiment", "budget")
     if not asked["experiment"]:
         raise ConfigError("experiment", "a name or a YAML file, e.g. experiment=track_maze", asked["experiment"])
     experiment = read_experiment(asked["experiment"])
-    jobs = plan_jobs(experiment, asked["budget"], others)
+    jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
     pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     before = len(jobs) - len(pending)
     print(

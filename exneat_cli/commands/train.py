@@ -19,17 +19,18 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
-    if not line.multirun:
+    if not line.multirun and not line.launcher:
         _train(line.words, read_job("train", line.compose()), go_on=False)
         return 0
     jobs, failures = [], []
     for name, each in line.combinations().items():
         try:
-            jobs.append(read_job(name, each.compose()))
+            jobs.append(read_job(name or "train", each.compose()))
         except ExneatError as error:
             failures.append(str(error))
-            print(f"exneat: {name}: {error}", file=sys.stderr)
-    failures += filter(None, run_jobs(functools.partial(_train, line.words, go_on=True), jobs, line))
+            print(f"exneat: {name or 'train'}: {error}", file=sys.stderr)
+    work = functools.partial(_train, line.words, go_on=line.multirun)
+    failures += filter(None, run_jobs(work, jobs, line) if jobs else [])
     if failures:
         reason = failures[0].splitlines()[0]
         raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}")
