@@ -12,12 +12,11 @@ from exneat_cli.algorithms.algorithm import (
 )
 from exneat_cli.algorithms.baselines import BASELINES, Baseline
 from exneat_cli.algorithms.exneat import NEAT, PAIRINGS, Coevolution, ExNEAT
-from exneat_cli.algorithms.hall_of_fame import HallOfFame
 from exneat_cli.algorithms.neat.conversion import from_stock, to_stock
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.genome_data import genome_from_data, genome_to_data
-from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings, neat_config
+from exneat_cli.algorithms.neat.neat_python import neat_config
+from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings
 from exneat_cli.algorithms.teams import pack_teams, unpack_teams
 
 ALGORITHMS: dict[str, type[Algorithm]] = {
@@ -41,7 +40,6 @@ __all__ = [
     "Coevolution",
     "EvolutionSettings",
     "ExNEAT",
-    "HallOfFame",
     "Problem",
     "Results",
     "Search",
@@ -49,8 +47,6 @@ __all__ = [
     "Team",
     "Trials",
     "from_stock",
-    "genome_from_data",
-    "genome_to_data",
     "neat_config",
     "pack_teams",
     "to_stock",

@@ -35,11 +35,12 @@ def summarise(study: Study, conditions: Iterable[str], columns: Mapping[str, Col
                 groups = {variant: runs.droplevel(0) for variant, runs in measured[name].dropna().groupby(level=0)}
                 values = {variant: groups.get(variant, pd.Series(dtype=float)) for variant in study.variants}
                 part = compare({variant: each.to_numpy() for variant, each in values.items()}, study.baselines)
+                part["efficiency"] = ""
                 if column.of == "robustness":
                     part["best_5"] = [_mean_of_best(study, condition, *each) for each in values.items()]
             place = {"experiment": study.experiment, "condition": condition, "quantity": name}
             parts.append(part.rename_axis("variant").reset_index().assign(**place))
-    return pd.concat(parts, ignore_index=True).reindex(columns=_SUMMARY).fillna({"efficiency": ""})
+    return pd.concat(parts, ignore_index=True).reindex(columns=_SUMMARY)
 
 
 def _measured(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, plan_from_data, read_champion_data
+from exneat_cli.records import Champion, RunDirectory, read_champion
 from exneat_cli.wiring import Plan
 
 Node = tuple[int, int]
@@ -74,17 +74,17 @@ def read_champion_graph(run: RunDirectory) -> ChampionGraph:
     """
     if not run.champion.exists():
         raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
-    return champion_graph(read_champion_data(run.champion))
+    return champion_graph(read_champion(run.champion))
 
 
-def champion_graph(content: dict[str, Any]) -> ChampionGraph:
-    """Make the graph of what `read_champion_data` gives."""
-    plan = plan_from_data(content["plan"])
-    genomes = [content["genomes"][module.subpopulation] for module in plan.modules]
-    nodes = [sorted(node["id"] for node in genome["nodes"]) for genome in genomes]
+def champion_graph(champion: Champion) -> ChampionGraph:
+    """Make the graph of what champion.json holds."""
+    plan = champion.plan
+    genomes = [champion.genomes[module.subpopulation] for module in plan.modules]
+    nodes = [sorted(node.id for node in genome.nodes) for genome in genomes]
     inputs = tuple(tuple((pin.module, pin.index) for pin in module.pins) for module in plan.modules)
     edges = tuple(
-        tuple(Edge(gene["from"], gene["to"], gene["weight"]) for gene in genome["connections"] if gene["enabled"])
+        tuple(Edge(gene.source, gene.target, gene.weight) for gene in genome.connections if gene.enabled)
         for genome in genomes
     )
     links = tuple(
@@ -100,14 +100,14 @@ def champion_graph(content: dict[str, Any]) -> ChampionGraph:
     back = [(target, source) for source, target in steps]
     return ChampionGraph(
         plan=plan,
-        actuators=tuple(content["actuators"]),
-        feed_forward=content["feed_forward"],
+        actuators=champion.actuators,
+        feed_forward=champion.feed_forward,
         inputs=inputs,
         hidden=tuple(tuple(keys[module.outputs :]) for keys, module in zip(nodes, plan.modules, strict=True)),
         edges=edges,
         links=links,
         used=frozenset(_reachable(sensing, steps) & _reachable(driving, back)),
-        test_fitness=content["scores"]["test"]["fitness_mean"],
+        test_fitness=champion.scores.test.fitness_mean,
     )
 
 

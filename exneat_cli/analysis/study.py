@@ -11,12 +11,11 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HISTORY_COLUMNS, RobustnessRow, RunDirectory, read_robustness
+from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDirectory, read_robustness
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
@@ -94,14 +93,10 @@ class Study:
         return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
 
     @functools.cached_property
-    def manifests(self) -> Mapping[PlannedRun, Mapping[str, Any]]:
+    def manifests(self) -> Mapping[PlannedRun, Manifest]:
         """The finished runs with their manifests."""
-        there = {run: run.directory.read_manifest() for run in self.runs if run.directory.is_there()}
-        return {
-            run: manifest
-            for run, manifest in there.items()
-            if manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
-        }
+        finished = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
+        return {run: run.directory.read_manifest() for run in finished}
 
     @property
     def finished(self) -> tuple[PlannedRun, ...]:
@@ -136,17 +131,23 @@ class Study:
         """
         rows = []
         for run, manifest in self.manifests.items():
-            champion = manifest["result"]["champion"]
-            test = {"test": champion["fitness_mean"], "full_reward": champion["full_reward_mean"]}
+            result = manifest.result
+            assert result is not None
+            figures = {"training": result.training, "validation": result.validation}
+            test = {"test": result.champion.fitness_mean, "full_reward": result.champion.full_reward_mean}
             place = {"condition": run.condition, "variant": run.variant, "seed": run.seed}
-            rows.append({**manifest["result"], **manifest.get("budget_spent", {}), **test, **place})
+            rows.append({**figures, **manifest.budget_spent, **test, **place})
         table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_RESULTS])
         return table.astype(dict.fromkeys(_RESULTS, float))
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-        validation = {run: manifest["result"].get("validation", -math.inf) for run, manifest in self.manifests.items()}
-        return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
+
+        def validation(run: PlannedRun) -> float:
+            result = self.manifests[run].result
+            return -math.inf if result is None or result.validation is None else result.validation
+
+        return sorted(self.of(condition, variant), key=validation, reverse=True)
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""

@@ -22,7 +22,7 @@ from exneat_cli.commands.experiments import (
     read_experiment,
 )
 from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.records import DONE, RunDirectory
+from exneat_cli.records import RunDirectory
 from exneat_cli.tasks import HasFullReward
 
 
@@ -169,7 +169,7 @@ def _largest_budget(experiment: Experiment, output: str) -> str:
         for condition in experiment.conditions:
             folder = Path(output) / f"{experiment.name}-{condition}-{budget}"
             runs = (RunDirectory(path.parent) for path in folder.glob("*/manifest.json"))
-            if any(run.read_manifest().get("status") == DONE for run in runs):
+            if any(run.is_finished() for run in runs):
                 return budget
     return next(budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
 

@@ -131,8 +131,8 @@ class Launch:
         directory = finished.directory
         run_robustness(directory, asked.sweeps, episodes=asked.episodes, executor=settings.executor, progress=progress)
         draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
-        champion = finished.result["champion"]
-        return f"{settings.task.fitness_name} {champion['fitness_mean']:.{settings.task.fitness_decimals}f}"
+        champion = finished.result.champion
+        return f"{settings.task.fitness_name} {champion.fitness_mean:.{settings.task.fitness_decimals}f}"
 
     def _tell_failure(self, job: Job, reason: str) -> None:
         with contextlib.suppress(OSError):  # on another machine the directory is not there
@@ -173,6 +173,6 @@ def _unfinished_because(job: Job) -> str:
         manifest = directory.read_manifest()
     except ExneatError as error:
         return str(error)
-    if manifest.get("status") == DONE:
+    if manifest.status == DONE:
         return "it was trained, but not tested at every level"
-    return str(manifest.get("error", f"it did not finish (status {manifest.get('status')})"))
+    return str(manifest.error or f"it did not finish (status {manifest.status})")

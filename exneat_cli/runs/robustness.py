@@ -12,16 +12,16 @@ from exneat_cli.brains import Brain, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.records import (
     DONE,
-    MANIFEST_FORMAT,
     RunDirectory,
+    Score,
     merge_robustness,
     read_champion,
     read_robustness,
     read_yaml,
 )
-from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
 from exneat_cli.runs.progress import Progress
-from exneat_cli.runs.scores import Score, robustness_row, score_all, unseen_episodes
+from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 
 
@@ -35,17 +35,14 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     if not directory.is_there():
         raise ExneatError(f"{where}: no run is there; exneat inspect without run= lists them")
     manifest = directory.read_manifest()
-    if manifest.get("format") != MANIFEST_FORMAT:
-        raise ExneatError(f"{where}: expected a run of format {MANIFEST_FORMAT}, got {manifest.get('format')!r}")
-    if manifest.get("status") != DONE:
+    if manifest.status != DONE:
         fix = "finish it first: the command that began it, with resume=true"
-        raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {fix}")
+        raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
         settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
-    described = {"configuration_hash": settings.full_hash, "generations": settings.trained_generations}
-    if any(manifest.get(key) != value for key, value in described.items()):
+    if not directory.is_finished(settings.full_hash, settings.trained_generations):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
 
@@ -53,16 +50,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
 def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> bool:
     """Whether the run of these settings is done and was tested at every level of `sweeps`."""
     directory = settings.directory
-    if not directory.is_there():
-        return False
-    manifest = directory.read_manifest()
-    wanted = {
-        "format": MANIFEST_FORMAT,
-        "status": DONE,
-        "configuration_hash": settings.full_hash,
-        "generations": settings.trained_generations,
-    }
-    if any(manifest.get(key) != value for key, value in wanted.items()):
+    if not directory.is_finished(settings.full_hash, settings.trained_generations):
         return False
     return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
 
@@ -124,10 +112,12 @@ def run_robustness(
             if not levels:
                 continue
             (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
-            todo = Sweep(sweep.name, sweep.parameter, levels)
-            seeds = unseen_episodes(settings, episodes)
-            tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
-            _write(directory, settings, sweep, {level: score_all(outcomes)[0] for level, outcomes in tested})
+            seeds, scores = unseen_episodes(settings, episodes), {}
+            for level in levels:
+                changed = perturbed(settings.task, settings.noise, sweep, level)
+                with Runner(*changed, executor, training=False) as runner:
+                    (scores[level],) = score_all(runner.run(acting, seeds))
+            _write(directory, settings, sweep, scores)
             done += len(levels)
     return done
 
@@ -142,7 +132,7 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
 
 
 def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
-    counted = {**directory.read_manifest().get("failed_robustness_episodes", {}), **failed}
+    counted = {**directory.read_manifest().failed_robustness_episodes, **failed}
     directory.update_manifest(failed_robustness_episodes={key: count for key, count in counted.items() if count})
 
 

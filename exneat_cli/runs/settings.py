@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -11,14 +9,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_whole, shortened
-from exneat_cli.records import RunDirectory, configuration_hash
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_whole
+from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _Part = TypeVar("_Part")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class RunSettings:
         if self.evolution is None:
             object.__setattr__(self, "evolution", RECURRENT if self.task.recurrent else EvolutionSettings())
         if isinstance(self.algorithm, str):
-            object.__setattr__(self, "algorithm", _algorithm({"name": self.algorithm}))
+            object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -144,27 +142,17 @@ class RunSettings:
         Raises:
             ConfigError: a key is unknown, or a value has the wrong type or range.
         """
-        parts: dict[str, type[Any]] = {
-            "geometry": Geometry,
-            "wiring": Wiring,
-            "noise": Noise,
-            "evolution": EvolutionSettings,
-            "executor": Executor,
-        }
-        task = _section("task", plain.get("task", {}))
-        check_choice("task.name", task.get("name"), list(TASKS))
-        values: dict[str, Any] = dict(plain)
-        values["task"] = _build(TASKS[task["name"]], task, "task.")
-        values["algorithm"] = _algorithm(_section("algorithm", plain.get("algorithm", {"name": "exneat"})))
-        for key, part in parts.items():
-            if key in values:
-                values[key] = _build(part, _section(key, values[key]), f"{key}.")
-        return _build(cls, values, "")
+        task = _chosen(TASKS, "task", plain.get("task"))
+        algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
+        return build(cls, {**plain, "task": task, "algorithm": algorithm})
 
 
-def _algorithm(values: Mapping[str, Any]) -> Algorithm:
-    check_choice("algorithm", values.get("name"), list(ALGORITHMS))
-    return _build(ALGORITHMS[values["name"]], values, "algorithm.")
+def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:
+    """One of several dataclasses, by the ``name`` in its section."""
+    if not isinstance(values, Mapping):
+        raise ConfigError(key, "a section with keys of its own", values)
+    check_choice(key, values.get("name"), list(registry))
+    return build(registry[values["name"]], values, f"{key}.")
 
 
 def executor_from(plain: object) -> Executor:
@@ -173,20 +161,4 @@ def executor_from(plain: object) -> Executor:
     Raises:
         ConfigError: a key is unknown, or a value has the wrong type or range.
     """
-    return _build(Executor, _section("executor", plain), "executor.")
-
-
-def _section(key: str, value: object) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError(key, "a section with keys of its own", value)
-    return value
-
-
-def _build(part: type[_Part], values: Mapping[str, Any], prefix: str) -> _Part:
-    known = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
-    for key in values:
-        if key not in known:
-            close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
-            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
-            raise ExneatError(f"{prefix}{key}: unknown key (value {shortened(values[key])})\n  {hint}")
-    return part(**values)
+    return build(Executor, plain, "executor.")

@@ -21,7 +21,7 @@ from exneat_cli.algorithms import (
     unpack_teams,
 )
 from exneat_cli.brains import assemble_all
-from exneat_cli.records import Checkpoint, HistoryRow
+from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import training_episodes
@@ -170,7 +170,7 @@ def _problem(settings: RunSettings) -> Problem:
 def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
     """A row of a checkpoint, which must be that of generation `number`."""
     finite = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
-    if not finite or row["generation"] != number:
+    if not finite or row["generation"] != number or not row.keys() >= set(HISTORY_COLUMNS):
         raise ValueError(f"expected the figures of generation {number}, got {row}")
     return dict(row)
 

@@ -178,7 +178,7 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
         train(_settings(task, algorithm, "smoke", output))
         settings = _settings(task, algorithm, "paper", output)
         seconds = seconds_of(partial(train, settings))
-        spent = settings.directory.read_manifest()["budget_spent"]
+        spent = settings.directory.read_manifest().budget_spent
     name = f"whole training, paper budget, {task}, {settings.variant}, 1 thread, warm compile cache"
     note = f"{spent['episodes']:,} training episodes, {spent['env_steps']:,} steps"
     return Row(name, SECONDS, [seconds], PAPER_BAR, note)

@@ -138,7 +138,7 @@ def test_bad_settings_are_refused_before_anything_is_made(
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").touch()
     code = main(["train", *overrides(tmp_path / "file")])
-    assert_refused(code, capfd.readouterr().err, "the run directory cannot be made")
+    assert_refused(code, capfd.readouterr().err, "the directory cannot be made")
 
 
 @pytest.mark.skipif(os.name != "posix" or os.getuid() != 0, reason="permissions bind everyone but root")

@@ -86,7 +86,7 @@ def test_training_with_a_sweep_ends_with_its_rows_and_another_sweep_does_not_tra
     assert "finished already" in capsys.readouterr().out
     assert len(rows_of(tmp_path / "hunting", "exneat")) == 3
     manifest = RunDirectory(next((tmp_path / "hunting").iterdir())).read_manifest()
-    assert manifest["failed_robustness_episodes"] == {}
+    assert manifest.failed_robustness_episodes == {}
 
 
 @pytest.mark.parametrize("sweep", SWEEPS)
@@ -140,13 +140,13 @@ def test_bad_input_is_refused_in_three_lines_and_leaves_no_row(
 
 
 def spoil_manifest(run: RunDirectory, **entries: object) -> None:
-    run.manifest.write_text(json.dumps({**run.read_manifest(), **entries}))
+    run.manifest.write_text(json.dumps({**json.loads(run.manifest.read_text()), **entries}))
 
 
 @pytest.mark.parametrize(
     ("spoil", "named"),
     [
-        (lambda run: spoil_manifest(run, format=99), "expected a run of format 2, got 99"),
+        (lambda run: spoil_manifest(run, format=99), "expected format 3, got 99"),
         (lambda run: spoil_manifest(run, status="running"), "expected a finished run, got status 'running'"),
         (lambda run: spoil_manifest(run, configuration_hash="0"), "does not describe the run beside it"),
         (lambda run: run.manifest.write_text("{"), "expected JSON"),
@@ -154,7 +154,7 @@ def spoil_manifest(run: RunDirectory, **entries: object) -> None:
         (lambda run: run.config.write_text("a: [\t"), "expected YAML"),
         (lambda run: run.config.unlink(), "could not be read"),
         (lambda run: run.champion.unlink(), "could not be read"),
-        (lambda run: run.champion.write_text("{}"), "expected a champion of format"),
+        (lambda run: run.champion.write_text("{}"), "champion.json: expected format 2"),
         (lambda run: run.robustness.write_text("x"), "expected a table"),
     ],
 )

@@ -155,7 +155,7 @@ def _with_wild_poses(seed: int, mistakes: Mistakes) -> None:
         sweep = Sweep("reset_noise", "noise.reset_scale", (0.1, 50.0))
         run_robustness(run, [sweep], episodes=2, executor=calm.executor)
         _look_at("ant, wild robustness", run, folder, 0, mistakes)
-        if not any("reset_noise=" in level for level in run.read_manifest()["failed_robustness_episodes"]):
+        if not any("reset_noise=" in level for level in run.read_manifest().failed_robustness_episodes):
             mistakes.add("ant, wild robustness: no failed episode was counted")
 
 

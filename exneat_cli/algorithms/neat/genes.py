@@ -33,8 +33,10 @@ CONNECTION = np.dtype(
 
 Nodes = NDArray[np.void]
 Connections = NDArray[np.void]
+Genes = tuple[Nodes, Connections]
+"""All genes of one genome."""
 
 
 def end_to_end(tables: Iterable[NDArray[np.void]], kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """All rows of all tables, read-only; NumPy would copy structured rows field by field."""
-    return np.frombuffer(b"".join(table.data for table in tables), kind)
+    """All rows of all tables, which are of this kind; bytes are copied, where NumPy would go field by field."""
+    return np.frombuffer(bytearray().join(table.data for table in tables), kind)
