@@ -195,7 +195,7 @@ class _Cluster:
             host="127.0.0.1",
             dashboard_address=None,
             # The scheduler listens there without a dashboard too.
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0", "local_directory": scratch},
             memory_limit=0,
             local_directory=scratch,
             silence_logs=logging.CRITICAL,

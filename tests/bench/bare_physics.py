@@ -77,7 +77,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
         VerificationError: a replay did not end where the episode did.
     """
     seeds, brains = workload.seeds, workload.brains()
-    simulation = TASK.open(training=False, reset_scale=0.1)
+    simulation = TASK.open(training=False)
     simulation.reset(simulation.world, generator(seeds.world))
     recordings = [record(TASK, simulation, lay_out(brains), b) for b in range(len(brains))]
     with open_runner(threads=1) as runner:
