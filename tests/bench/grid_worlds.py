@@ -14,7 +14,7 @@ import yaml
 from exneat_cli.algorithms import RECURRENT, ArrayGenome, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
-from exneat_cli.commands.composition import configuration_directory
+from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
@@ -185,7 +185,7 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
 
 
 def _settings(task: str, algorithm: str, budget: str, output: str) -> RunSettings:
-    path = configuration_directory() / "task" / f"{task}.yaml"
+    path = shipped_directory("conf") / "task" / f"{task}.yaml"
     numbers = yaml.safe_load(path.read_text(encoding="utf-8"))["budgets"][budget]
     del numbers["sweep_episodes"]
     executor = Executor("threads", 1)

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from exneat_cli.tasks.robots.simulator_trial import Physics
 
 from exneat_cli import compiling
 from exneat_cli.commands import findings, installation
@@ -22,7 +23,6 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import disk, provenance
 from exneat_cli.tasks.robots import simulator_trial
-from exneat_cli.tasks.robots.simulator_trial import Physics
 
 Ask = Callable[..., tuple[int, dict[str, str], str]]
 LINE = re.compile(r"^(ok|degraded|broken) +(\S+(?: \S+)*?)(?:  +|$)", re.MULTILINE)
