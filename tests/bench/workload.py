@@ -13,7 +13,7 @@ from exneat_cli.brains import Brain, assemble
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import Geometry, Wiring, plan_wiring
+from exneat_cli.wiring import plan_body
 from tests.bench.measurement import VerificationError
 
 CANDIDATES = 100
@@ -22,7 +22,7 @@ ROOT_SEED = 0
 
 TASK = AntTask(max_steps=1000)
 SETTINGS = EvolutionSettings()
-PLAN = plan_wiring(TASK, "neat", Geometry(), "none", Wiring(), hidden=SETTINGS.neat_hidden)
+PLAN = plan_body(TASK, hidden=SETTINGS.neat_hidden)
 
 
 class Workload(NamedTuple):

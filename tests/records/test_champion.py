@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from exneat_cli.algorithms import Candidate, Team
-from exneat_cli.brains.brain import Brain, activate, lay_out, memory_size
+from exneat_cli.brains import Brain
+from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import (
     Champion,
@@ -140,7 +141,7 @@ def test_whatever_is_changed_in_a_champion_it_is_refused_or_stays_within_its_mem
         return
     brain = champion.brain()
     check_sizes(brain)
-    memory, action = np.zeros(memory_size(lay_out([brain]))), np.zeros(len(brain.output_slot))
+    memory, action = np.zeros(memory_size(lay_out([brain]))), np.zeros(brain.output_slot.shape[1])
     activate(lay_out([brain]), 0, memory, action)
     assert action.shape == (champion.plan.action_size,)
 

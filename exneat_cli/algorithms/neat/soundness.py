@@ -52,4 +52,6 @@ def check_genome(genome: ArrayGenome, inputs: int, outputs: int, *, feed_forward
         try:
             graph.prepare()
         except CycleError as error:
-            raise ValueError(f"genome {genome.key}: expected a feed-forward network, got one with a cycle") from error
+            raise ValueError(
+                f"genome {genome.key}: expected a feed-forward network, got one that feeds itself"
+            ) from error
