@@ -5,17 +5,3 @@ from exneat_cli.runs.robustness import check_sweeps, is_finished, load_settings,
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
 from exneat_cli.runs.settings import RunSettings
-
-__all__ = [
-    "Finished",
-    "Lines",
-    "Progress",
-    "RunSettings",
-    "check_sweeps",
-    "is_finished",
-    "load_settings",
-    "progress_for_terminal",
-    "run_robustness",
-    "summary_sentence",
-    "train",
-]

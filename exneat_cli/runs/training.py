@@ -11,15 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms import (
-    Problem,
-    Results,
-    Search,
-    State,
-    Team,
-    pack_teams,
-    unpack_teams,
-)
+from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
 from exneat_cli.brains import assemble_all
 from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner

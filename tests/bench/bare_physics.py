@@ -85,8 +85,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
             check_x("step by step", recording.final_x, float(runner.trace(brain, seeds).steps[-1, 0]))
         pairs = [
             Pair(
-                partial(seconds_of, partial(runner.run, [brain], [seeds])),
-                partial(_replay_one, simulation, recording),
+                partial(seconds_of, partial(runner.run, [brain], [seeds])), partial(_replay_one, simulation, recording)
             )
             for brain, recording in zip(brains, recordings, strict=True)
         ]

@@ -217,11 +217,7 @@ CASES = [
 
 @pytest.mark.parametrize(("arguments", "named"), CASES, ids=[ascii(given) for given in (*TRAIN, *OTHERS)])
 def test_a_command_line_that_makes_no_sense_is_refused_before_anything_is_made(
-    arguments: list[str],
-    named: str,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").touch()

@@ -83,10 +83,7 @@ OTHERS = {
     "other_run": (config_with("size: 13", "size: 15"), "config.yaml: does not describe the run beside it"),
     "no_champion": (lambda run: run.champion.unlink(), "champion.json: could not be read"),
     "no_json": (lambda run: run.champion.write_text("{}"), "champion.json: "),
-    "other_variant": (
-        champion_with("variant", value="random"),
-        "expected a champion of neat, got random",
-    ),
+    "other_variant": (champion_with("variant", value="random"), "expected a champion of neat, got random"),
     "other_plan": (champion_with("plan", "observation_size", value=9), "champion.json: is wired differently"),
     "other_kind": (champion_with("feed_forward", value=True), "champion.json: is wired differently"),
     "table": (lambda run: run.robustness.write_text("x"), "robustness.csv"),

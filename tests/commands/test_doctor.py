@@ -153,9 +153,7 @@ def test_a_part_that_cannot_be_loaded_is_broken_and_the_rest_is_left_alone(
     real = importlib.import_module
     failing = raising(ImportError("libGL.so.1: cannot open shared object file"))
     monkeypatch.setattr(
-        installation.importlib,
-        "import_module",
-        lambda name: failing() if name == "exneat_cli.analysis" else real(name),
+        installation.importlib, "import_module", lambda name: failing() if name == "exneat_cli.analysis" else real(name)
     )
     _, states, printed = ask()
     assert states["loading"] == findings.BROKEN

@@ -6,9 +6,9 @@ import dataclasses
 
 import pytest
 import yaml
+from exneat_cli.commands.composition import configuration_directory
 
 from exneat_cli.algorithms import RECURRENT, EvolutionSettings
-from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.errors import ConfigError
 
 
