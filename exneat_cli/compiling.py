@@ -66,7 +66,9 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def compiled_lean(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:
-    """The same for what runs at every step: made part of its caller, and allocates nothing; `cache` may be left out.
+    """The same for what runs at every step: made part of its caller, and allocates nothing.
+
+    Without `cache` it is kept nowhere.
 
     Passing tuples of arrays to a function and counting references to them costs several times as much as
     what a step of a grid world does. Code that allocates nothing can leave out the counting.
