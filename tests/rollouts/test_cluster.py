@@ -19,7 +19,7 @@ import pytest
 
 from exneat_cli.brains import RandomActions
 from exneat_cli.errors import ConfigError, ExneatError
-from exneat_cli.rollouts import Executor, cluster, executor, keep_clusters
+from exneat_cli.rollouts import Executor, cluster, keep_clusters, settings
 from exneat_cli.rollouts.cluster import cluster_of, run_block, versions
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import AntTask, GeneralMaze, Task
@@ -49,7 +49,7 @@ def _one_cluster_for_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
 @pytest.mark.parametrize("task", [ANT, GeneralMaze(), PLAIN], ids=lambda task: task.name)
 def test_outcomes_and_moments_are_those_of_one_thread(task: Task, workers: int) -> None:
     where = Executor("dask", workers)
-    for brains in (random_brains(31, task), random_brains(1, task), RandomActions(*task.action_bounds)):
+    for brains in (random_brains(13, task), random_brains(1, task), RandomActions(*task.action_bounds)):
         assert_equal(run(task, brains, where), run(task, brains, SERIAL))
 
 
@@ -96,7 +96,7 @@ def test_an_error_in_a_worker_reaches_the_caller_and_leaves_the_cluster_usable(
 
 
 def test_the_work_of_killed_workers_is_done_again() -> None:
-    brains, killed = random_brains(40, ANT), []
+    brains, killed = random_brains(20, ANT), []
 
     def kill() -> None:
         for pid in workers_of_this_process():
@@ -140,7 +140,7 @@ def test_an_address_that_makes_no_sense_is_refused() -> None:
 
 
 def test_without_dask_a_run_is_refused_before_it_leaves_anything(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setattr(executor, "find_spec", lambda name: None)
+    monkeypatch.setattr(settings, "find_spec", lambda name: None)
     with pytest.raises(ExneatError, match=r"pip install 'exneat\[dask\]'"):
         train(RunSettings(executor=TWO, output=str(tmp_path / "out")))
     assert not list(tmp_path.iterdir())

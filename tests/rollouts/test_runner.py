@@ -6,20 +6,16 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import gymnasium
-import neat
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms import Problem, neat_config, to_stock
-from exneat_cli.brains import Brain, RandomActions, assemble, motionless
+from exneat_cli.brains import Brain, RandomActions, motionless
 from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.compiling import compiled_lean
 from exneat_cli.rollouts import Executor, Noise, Runner
-from exneat_cli.runs import RunSettings
-from exneat_cli.seeding import generator, shared_episodes, training_episodes
-from exneat_cli.tasks import AntTask, TrackMaze
+from exneat_cli.seeding import generator, training_episodes
+from exneat_cli.tasks import TrackMaze
 from tests.rollouts.drifting import EPISODES, PLAIN, SERIAL, Drifting, assert_equal, random_brains, run
 
 EXPLODING = weighted_sums(np.full((1, 3), math.nan), np.zeros(1))
@@ -135,23 +131,3 @@ def test_an_error_in_one_thread_stops_the_others_reaches_the_caller_and_leaves_t
             runner.run(brains, episodes)
         assert 3 <= len(begun) < 20
         assert_equal(runner.run(brains, episodes, moments=True), expected)
-
-
-def test_a_genome_of_neat_walks_the_same_over_gymnasium_and_neat_pythons_network() -> None:
-    settings = RunSettings(algorithm="neat")
-    team = settings.algorithm.start(Problem(settings.plan, settings.evolution, 3, 1, "rank", seed=5)).ask().teams[0]
-    config = neat_config(settings.evolution, 3, settings.plan.subpopulation_shapes[0])
-    network = neat.nn.FeedForwardNetwork.create(to_stock(team.genomes[0]), config)
-    (seeds,) = shared_episodes("test", 1)
-    with Runner(AntTask(), Noise(), SERIAL, training=False) as runner:
-        outcomes = runner.run([assemble(settings.plan, team.genomes, feed_forward=True)], [seeds])
-    env = gymnasium.make("Ant-v5", disable_env_checker=True)
-    env.unwrapped.np_random = generator(seeds.world)
-    observation, _ = env.reset()
-    forward, steps, over = 0.0, 0, False
-    while not over:
-        observation, _, terminated, truncated, info = env.step(np.array(network.activate(observation)))
-        forward, steps, over = forward + info["reward_forward"], steps + 1, terminated or truncated
-    env.close()
-    assert steps == outcomes.steps[0, 0]
-    assert forward == pytest.approx(outcomes.fitness[0, 0], abs=1e-6)
