@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from exneat_cli.algorithms import (
     ALGORITHMS,
     Algorithm,
-    ArrayGenome,
     Candidate,
     Problem,
     Results,
@@ -24,7 +23,7 @@ from exneat_cli.algorithms import (
     State,
     Team,
     Trials,
-    neat_config,
+    initial_genomes,
     pack_teams,
     unpack_teams,
 )
@@ -134,11 +133,9 @@ class Draws(Search):
         key = self.generation * self.problem.population + number + 1
         genomes = []
         for index, shape in enumerate(self.problem.plan.subpopulation_shapes):
-            config = neat_config(self.problem.evolution, 2, shape).genome_config
-            config.chance.seed(hash((self.problem.seed, key, index)))
-            config.innovation_tracker = Numbers()
-            genome = ArrayGenome(key)
-            genome.configure_new(config)
+            rng = np.random.default_rng((self.problem.seed, key, index))
+            (genome,) = initial_genomes(self.problem.evolution, shape, 1, rng)
+            genome.key = key
             genomes.append(genome)
         return Team(tuple(genomes), (key,) * len(genomes))
 
@@ -162,17 +159,6 @@ class Draws(Search):
 
     def columns(self) -> dict[str, int | float]:
         return {"record": self.fitness}
-
-
-class Numbers:
-    """Innovation numbers in the order of asking."""
-
-    def __init__(self) -> None:
-        self.last = 0
-
-    def get_innovation_number(self, *_: object) -> int:
-        self.last += 1
-        return self.last
 
 
 def opposite(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
