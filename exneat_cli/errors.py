@@ -6,9 +6,10 @@ lines; `exneat_cli.main` prints it without a traceback and exits with code 2.
 
 from __future__ import annotations
 
+import difflib
 import math
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 _LONGEST_VALUE = 160
@@ -119,3 +120,47 @@ def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
     """
     if not isinstance(value, str) or value not in choices:
         raise ConfigError(key, "one of " + ", ".join(choices), value)
+
+
+def check_text(key: str, value: object, expected: str = "text") -> None:
+    """Refuse anything but printable text, at least one character of it.
+
+    Args:
+        key: the setting's dotted name.
+        value: what came.
+        expected: what the text must be, in words.
+
+    Raises:
+        ConfigError: `value` is something else.
+    """
+    if not isinstance(value, str) or not value or not value.isprintable():
+        raise ConfigError(key, expected, value)
+
+
+def check_section(key: str, value: object) -> Mapping[str, Any]:
+    """Return keys with values, and refuse anything else.
+
+    Raises:
+        ConfigError: `value` is something else.
+    """
+    if not isinstance(value, Mapping):
+        raise ConfigError(key, "a section with keys of its own", value)
+    return value
+
+
+def check_keys(prefix: str, values: Mapping[str, Any], known: Collection[str]) -> None:
+    """Refuse a key that is not among those `known`, and name the nearest that is.
+
+    Args:
+        prefix: what stands before the keys in messages, e.g. ``task.``.
+        values: keys with values.
+        known: the keys that there are.
+
+    Raises:
+        ExneatError: there is such a key.
+    """
+    for key in values:
+        if key not in known:
+            close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
+            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
+            raise ExneatError(f"{prefix}{key}: unknown key (value {shortened(values[key])})\n  {hint}")

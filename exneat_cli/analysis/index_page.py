@@ -100,7 +100,8 @@ def _facts(study: Study) -> dict[str, Any]:
     for variant, label in study.variants.items():
         seeds = [run.seed for run in study.runs if run.variant == variant]
         finished = sum(run.variant == variant for run in study.finished)
-        rows.append((label, str(finished), str(len(seeds)), f"{min(seeds)} to {max(seeds)}" if seeds else ""))
+        ends = dict.fromkeys((min(seeds, default=""), max(seeds, default="")))
+        rows.append((label, str(finished), str(len(seeds)), " to ".join(map(str, ends))))
     versions: dict[str, set[str]] = {}
     for manifest in study.manifests.values():
         for library, version in manifest.versions.items():

@@ -1,7 +1,7 @@
 """Tables as CSV for machines and Markdown for people: those of the catalogue, and one comparison per experiment.
 
-Both show lines of a summary (`exneat_cli.analysis.measurements`), one per condition, variant and quantity: a table of
-the catalogue one under another, beside what was published; a comparison with the quantities side by side.
+Both show lines of a summary, one per condition, variant and quantity: a table of the catalogue one under another,
+beside what was published; a comparison with the quantities side by side.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ import pandas as pd
 
 from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
-from exneat_cli.analysis.measurements import STATISTICS, summarise
+from exneat_cli.analysis.statistics import compare, efficiency, mean
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study
 from exneat_cli.errors import check_choice
 from exneat_cli.records import make_directory, write_whole
 
+STATISTICS = ["mean", "low", "high", "iqm", "best_5"]
+"""Columns of a summary that are in the unit of their quantity."""
+_KEY = ["experiment", "condition", "variant", "quantity"]
+_SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
 LARGE = 10.0
 """Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
-_KEY = ["experiment", "condition", "variant", "quantity"]
 _PLACE = ["condition", "variant", "quantity", "published"]
 
 
@@ -69,7 +72,7 @@ def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFram
         study = studies[str(experiment)]
         study.require(str(condition), dict.fromkeys([study.first_variant, *own["variant"]]))
     summaries = [
-        summarise(studies[str(experiment)], own["condition"].unique(), plan.columns)
+        _summary(studies[str(experiment)], own["condition"].unique(), plan.columns)
         for experiment, own in planned.groupby("experiment", sort=False)
     ]
     lines = planned.merge(pd.concat(summaries), on=_KEY, how="left")
@@ -106,7 +109,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
         shown += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
     shown += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
     shown += [("efficiency", "efficiency", "mean")]
-    lines = summarise(study, conditions, columns)
+    lines = _summary(study, conditions, columns)
     labelled = _labelled(lines, {study.experiment: study})
     name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
     words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
@@ -166,3 +169,64 @@ def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFra
 
 def _line(cells: Iterable[str]) -> str:
     return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"
+
+
+def _summary(study: Study, conditions: Iterable[str], columns: Mapping[str, Column]) -> pd.DataFrame:
+    """One row per condition, quantity and variant of the study, which are compared within each condition.
+
+    Columns: `_SUMMARY`; best_5 is the mean over the `BEST` runs best on validation, of robustness alone. Rows of
+    efficiency, which is a text, count all finished runs and have no statistics.
+    """
+    parts = []
+    for condition in conditions:
+        measured = _measured(study, condition, columns)
+        for name, column in columns.items():
+            if column.of == "efficiency":
+                runs = {variant: len(study.of(condition, variant)) for variant in study.variants}
+                part = pd.DataFrame({"runs": runs, "efficiency": _efficiencies(study, condition)})
+            else:
+                groups = {variant: runs.droplevel(0) for variant, runs in measured[name].dropna().groupby(level=0)}
+                values = {variant: groups.get(variant, pd.Series(dtype=float)) for variant in study.variants}
+                part = compare({variant: each.to_numpy() for variant, each in values.items()}, study.baselines)
+                part["efficiency"] = ""
+                if column.of == "robustness":
+                    part["best_5"] = [_mean_of_best(study, condition, *each) for each in values.items()]
+            place = {"experiment": study.experiment, "condition": condition, "quantity": name}
+            parts.append(part.rename_axis("variant").reset_index().assign(**place))
+    return pd.concat(parts, ignore_index=True).reindex(columns=_SUMMARY)
+
+
+def _measured(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
+    """One row per finished run, indexed by variant and seed; one column per quantity, NaN where a run has none."""
+    results = study.results[study.results["condition"] == condition].set_index(["variant", "seed"])
+    measured = pd.DataFrame(index=results.index)
+    if any(column.of == "robustness" for column in columns.values()):
+        swept = study.robustness(condition).set_index(["variant", "seed"])
+    for name, column in columns.items():
+        if column.of == "robustness":
+            level = np.isclose(swept["level"].astype(float), float(column.level or 0.0))
+            here = swept.loc[level & (swept["parameter"] == column.sweep), f"{column.value}_mean"]
+            measured[name] = here[~here.index.duplicated(keep="last")].astype(float)
+        elif column.of != "efficiency":
+            measured[name] = results[column.of]
+    return measured
+
+
+def _mean_of_best(study: Study, condition: str, variant: str, values: pd.Series) -> float:
+    best = [values[run.seed] for run in study.best_first(condition, variant) if run.seed in values]
+    return mean(best[:BEST])
+
+
+def _efficiencies(study: Study, condition: str) -> dict[str, str]:
+    """The generation at which each variant's mean curve reaches the final mean of the study's first variant.
+
+    E.g. ``7``, ``>20`` if 20 were not enough, or nothing if the variant or the first one has no curve.
+    """
+    best = study.history(condition).groupby(["variant", "generation"])["best_so_far"].mean()
+    curves = {variant: curve.to_numpy() for variant, curve in best.groupby("variant")}
+    found = dict.fromkeys(study.variants, "")
+    if study.first_variant in curves:
+        target = float(curves[study.first_variant][-1])
+        for variant, curve in curves.items():
+            found[str(variant)] = str(efficiency(curve, target) or f">{len(curve)}")
+    return found

@@ -1,182 +1,199 @@
-"""`exneat doctor`: whether this machine is fit for exneat, line by line, and what to do where it is not."""
+"""`exneat doctor`: whether this machine is fit for exneat, line by line, and what to do where it is not.
+
+The checks import what they need themselves, so that a library that is missing or broken costs one line.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from exneat_cli.commands.findings import BROKEN, DEGRADED, OK, Check, Finding, findings_of
-from exneat_cli.commands.installation import installation_checks, loading
-from exneat_cli.errors import ExneatError
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.errors import ExneatError, check_keys, check_text
 
-GIGABYTE = 1_000_000_000
-LEAST_MEMORY = GIGABYTE
-"""Bytes; a small training of Ant was seen to take half of it."""
-LEAST_DISK = GIGABYTE
-"""Bytes that should be left for runs."""
+if TYPE_CHECKING:
+    from exneat_cli.records import RunDirectory
+
+OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
+LEAST = 1_000_000_000
+"""Bytes of memory, of which a small training of Ant takes half, and of disk, that should be left."""
+_ROOMS = ("exneat_cli.runs", "exneat_cli.analysis", "exneat_cli.commands.launching")
+"""Importing these imports every other room and every library."""
+_PHYSICS = """
+import mujoco, numba
+from exneat_cli.tasks.robots.mujoco_library import load_library, mj_step
+load_library()
+model = mujoco.MjModel.from_xml_string(
+    '<mujoco><worldbody><geom type="plane" size="9 9 1"/>'
+    '<body pos="0 0 1"><freejoint/><geom size=".2 .3" type="capsule" euler="9 40 0"/></body></worldbody></mujoco>')
+data, expected = mujoco.MjData(model), mujoco.MjData(model)
+mujoco.mj_step(model, expected, 500)
+
+@numba.njit
+def step(model, data):
+    for _ in range(500):
+        mj_step(model, data)
+
+step(model._address, data._address)
+if (data.qpos != expected.qpos).any():
+    raise SystemExit("compiled code steps MuJoCo otherwise than MuJoCo's own Python bindings")
+print(f"MuJoCo {mujoco.__version__} stepped from compiled code, as by its own bindings")
+"""
+_FRAME = """
+import os, mujoco
+model = mujoco.MjModel.from_xml_string(
+    '<mujoco><worldbody><light pos="0 0 3"/><geom size="1"/></worldbody></mujoco>')
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 240, 320) as renderer:
+    renderer.update_scene(data)
+    if not renderer.render().any():
+        raise SystemExit("the frame is black")
+print(f"MuJoCo draws off-screen (MUJOCO_GL={os.environ.get('MUJOCO_GL', 'not set')})")
+"""
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(line: CommandLine) -> int:
     """Look at everything and print a line each; returns 1 if anything is broken, else 0.
 
     Raises:
-        ExneatError: an argument is unknown.
+        ExneatError: an argument makes no sense.
     """
-    output = Path("outputs")
-    for argument in arguments:
-        key, separator, value = argument.partition("=")
-        if key != "output" or not separator or not value:
-            raise ExneatError(f"{argument}: expected output=<root of runs>")
-        output = Path(value)
+    plain = line.compose()
+    check_keys("", plain, ("output",))
+    check_text("output", plain["output"], "a directory")
     states: Counter[str] = Counter()
-    for finding in _all_findings(output):
-        print(finding.lines(), flush=True)
-        states[finding.state] += 1
-    print(f"\n{states[OK]} ok, {states[DEGRADED]} degraded, {states[BROKEN]} broken: {_conclusion(states)}")
+    for name, look, worst, remedy in _checks(Path(plain["output"])):
+        try:
+            state, found = OK, look()
+        except Exception as error:  # whatever is wrong with this machine is what we are asked for
+            state, found = worst, str(error) if isinstance(error, ExneatError) else f"{type(error).__name__}: {error}"
+        print(f"{state:<9} {name:<16} {found}".replace("\n", "\n" + " " * 27), flush=True)
+        if state != OK:
+            print(f"{'':<10}remedy: {remedy}")
+        states[state] += 1
+        if name == "loading" and state != OK:
+            break  # the other checks are exneat's own code at work, and would only say the same again
+    conclusion = "is not fit for exneat until what is broken is fixed" if states[BROKEN] else "is fit for exneat"
+    print(f"\n{states[OK]} ok, {states[DEGRADED]} degraded, {states[BROKEN]} broken: this machine {conclusion}.")
     return 1 if states[BROKEN] else 0
 
 
-def _all_findings(output: Path) -> Iterator[Finding]:
-    for check in installation_checks():
-        yield from findings_of(check)
-    loaded = list(findings_of(Check("loading", loading)))
-    yield from loaded
-    # The other checks are exneat's own code at work; without it each would only say the same again.
-    if all(finding.state != BROKEN for finding in loaded):
-        for check in machine_checks(output):
-            yield from findings_of(check)
-
-
-def _conclusion(states: Counter[str]) -> str:
-    if states[BROKEN]:
-        return "this machine is not fit for exneat until what is broken is fixed."
-    return "this machine is fit for exneat."
-
-
-def machine_checks(output: Path) -> list[Check]:
-    """Processor, memory, simulator and disk.
-
-    Args:
-        output: root of the runs.
-    """
+def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
+    """Name, what looks at it and says what it found, the state if that raises, and what helps then."""
+    install = "install exneat anew in an environment of its own, or what is named here alone"
+    place = "set output= to a directory on a disk that you can write to and that has locks"
+    egl = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and set MUJOCO_GL=egl; training needs no rendering"
     return [
-        Check("processor", _processor),
-        Check("memory", _memory),
-        Check("compiled MuJoCo", _physics),
-        Check("rendering", _rendering),
-        Check("compile cache", _cache),
-        Check("output root", lambda: _output(output)),
-        Check("disk space", lambda: _disk_space(output)),
+        ("python", _versions, DEGRADED, install),
+        ("packages", lambda: said_by(["-m", "pip", "check"]), DEGRADED, install),
+        ("loading", _loading, BROKEN, f"{install}; unset MUJOCO_GL if it is set"),
+        ("compiled MuJoCo", lambda: said_by(["-c", _PHYSICS]), BROKEN, f"{install}; unset NUMBA_DISABLE_JIT"),
+        ("rendering", _rendering, DEGRADED, egl),
+        ("compile cache", _cache, DEGRADED, "set NUMBA_CACHE_DIR to a directory that you can write to"),
+        ("output root", lambda: _output(output), BROKEN, place),
+        ("memory", _memory, DEGRADED, "close other programs, or do one run at a time"),
+        ("disk space", lambda: _disk_space(output), DEGRADED, "make room, or set output= to another disk"),
     ]
 
 
-def _processor() -> Iterable[Finding]:
-    from exneat_cli.records import provenance
-    from exneat_cli.rollouts import Executor
-
-    threads = Executor().threads
-    cores = f"exneat takes {threads} {'thread' if threads == 1 else 'threads'} of {os.cpu_count()} cores"
-    yield Finding(OK, "processor", f"{provenance.processor()}; {cores}")
+def _versions() -> str:
+    needed = [text for text in metadata.requires("exneat") or () if "extra ==" not in text]
+    names = ["exneat", *(re.split(r"[^\w.-]", text)[0] for text in needed)]
+    return ", ".join([f"Python {platform.python_version()}", *(f"{name} {metadata.version(name)}" for name in names)])
 
 
-def _memory() -> Iterable[Finding]:
+def _loading() -> str:
+    for room in _ROOMS:
+        importlib.import_module(room)
+    return "every part of exneat can be loaded"
+
+
+def _memory() -> str:
     from exneat_cli.records import provenance
 
     available = provenance.available_memory()
-    if available is None:
-        yield Finding(OK, "memory", "this system does not say how much is available")
-    elif available >= LEAST_MEMORY:
-        yield Finding(OK, "memory", f"{available / GIGABYTE:.1f} GB available")
-    else:
-        found = f"{available / GIGABYTE:.1f} GB available; a run takes about half a GB"
-        yield Finding(DEGRADED, "memory", found, "close other programs, or do one run at a time")
+    return "not told by this system" if available is None else _enough(available, "available")
 
 
-def _physics() -> Iterable[Finding]:
-    from exneat_cli.tasks.robots import simulator_trial
+def _disk_space(output: Path) -> str:
+    return _enough(shutil.disk_usage(_nearest(output)).free, f"left for output={output}")
 
-    name = "compiled MuJoCo"
+
+def _enough(found: int, what: str) -> str:
+    said = f"{found / 1e9:.1f} GB {what}"
+    if found < LEAST:
+        raise ExneatError(f"{said}, which is little")
+    return said
+
+
+def _rendering() -> str:
+    egl = {} if "MUJOCO_GL" in os.environ or sys.platform != "linux" else {"MUJOCO_GL": "egl"}  # needs no screen
+    return said_by(["-c", _FRAME], 60.0, **egl)
+
+
+def said_by(arguments: Sequence[str], seconds: float = 180.0, **environment: str) -> str:
+    """What Python says in a process of its own, which a driver or a library of another version may take down.
+
+    Raises:
+        ExneatError: it failed, crashed, or took longer than that.
+    """
     try:
-        physics = simulator_trial.try_physics()
-    except ExneatError as error:
-        remedy = "install MuJoCo, Gymnasium and numba anew; task=ant cannot be trained before"
-        if "NUMBA_DISABLE_JIT" in os.environ:
-            remedy = "unset NUMBA_DISABLE_JIT: exneat needs compiled code"
-        yield Finding(BROKEN, name, f"Ant cannot be stepped: {error}", remedy)
-        return
-    if physics.compiled:
-        yield Finding(OK, name, f"MuJoCo {physics.version} stepped from compiled code, as by its own bindings")
-    else:
-        found = f"Ant runs over Gymnasium, slower and on one core: {physics.because}"
-        remedy = "install mujoco anew from its wheel, which holds its library, or use the grid worlds"
-        yield Finding(DEGRADED, name, found, remedy)
-
-
-def _rendering() -> Iterable[Finding]:
-    from exneat_cli.tasks.robots import simulator_trial
-
-    try:
-        backend = simulator_trial.try_rendering()
-    except ExneatError as error:
-        remedy = (
-            "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and set MUJOCO_GL=egl; training needs no rendering"
+        done = subprocess.run(
+            [sys.executable, "-P", *arguments],  # -P: files of the working directory stand in for no library
+            env={**os.environ, **environment},
+            capture_output=True,
+            errors="replace",
+            timeout=seconds,
+            check=False,
         )
-        yield Finding(DEGRADED, "rendering", f"no picture of MuJoCo off-screen: {error}", remedy)
-    else:
-        yield Finding(OK, "rendering", f"MuJoCo draws off-screen (MUJOCO_GL={backend})")
+    except subprocess.TimeoutExpired:
+        raise ExneatError(f"no answer within {seconds:g} s") from None
+    if done.returncode < 0:
+        raise ExneatError(f"its process was ended by {signal.Signals(-done.returncode).name}")
+    if done.returncode:
+        raise ExneatError(done.stdout.strip() or done.stderr.strip().split("\n")[-1] or f"exit code {done.returncode}")
+    return done.stdout.strip()
 
 
-def _cache() -> Iterable[Finding]:
+def _cache() -> str:
     from exneat_cli.compiling import cache_directory, cache_root
-    from exneat_cli.records import disk
 
     directory = cache_directory()
-    try:
-        if directory is None:
-            raise ExneatError(f"{cache_root()} cannot be written to")
-        disk.try_writing(directory)
-    except (ExneatError, RuntimeError) as error:  # RuntimeError: a user without a home directory
-        remedy = "set NUMBA_CACHE_DIR to a directory that you can write to"
-        yield Finding(DEGRADED, "compile cache", f"every start compiles anew: {error}", remedy)
-    else:
-        yield Finding(OK, "compile cache", f"{directory} can be written")
+    if directory is None:
+        raise ExneatError(f"every start compiles anew: {cache_root()} cannot be written to")
+    with _trial(directory):
+        return f"{directory} can be written"
 
 
-def _output(root: Path) -> Iterable[Finding]:
-    from exneat_cli.records import disk
-
-    remedy = "set output= to a directory on a disk that you can write to"
-    try:
-        disk.try_writing(root)
-    except ExneatError as error:
-        yield Finding(BROKEN, "output root", f"output={root}: {error}", remedy)
-        return
-    state = "can be written" if root.is_dir() else "can be made"
-    yield Finding(OK, "output root", f"output={root} {state}")
-    try:
-        exclude = disk.locks_exclude(root)
-    except ExneatError as error:
-        yield Finding(BROKEN, "locks", f"output={root}: {error}", remedy + " and that has locks")
-        return
-    if exclude:
-        yield Finding(OK, "locks", "a second process is kept out of a run directory")
-    else:
-        yield Finding(
-            DEGRADED, "locks", f"output={root}: the file system grants a lock twice", "never do one run twice"
-        )
+def _output(output: Path) -> str:
+    with _trial(output) as run, run.held(), contextlib.suppress(ExneatError), run.held():
+        raise OSError(f"output={output}: the file system grants a lock twice")
+    return f"output={output} can be {'written' if output.is_dir() else 'made'}, and keeps a second process out"
 
 
-def _disk_space(root: Path) -> Iterable[Finding]:
-    from exneat_cli.records import disk
+@contextlib.contextmanager
+def _trial(place: Path) -> Iterator[RunDirectory]:
+    """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
+    from exneat_cli.records import RunDirectory, write_whole
 
-    try:
-        free = disk.free_bytes(root)
-    except ExneatError:  # the line about the output root says it
-        return
-    found = f"{free / GIGABYTE:.1f} GB left for output={root}"
-    if free >= LEAST_DISK:
-        yield Finding(OK, "disk space", found)
-    else:
-        yield Finding(DEGRADED, "disk space", found, "make room, or set output= to another disk")
+    with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=_nearest(place)) as name:
+        write_whole(Path(name) / "trial", b"written by exneat doctor\n")
+        yield RunDirectory(Path(name))
+
+
+def _nearest(place: Path) -> Path:
+    return next(each for each in (place.absolute(), *place.absolute().parents) if os.path.lexists(each))

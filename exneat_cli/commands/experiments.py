@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig
+import yaml
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
-from exneat_cli.commands.composition import BUDGETS, composing, settings_from, shipped_directory
-from exneat_cli.commands.drawing import missing_figures
-from exneat_cli.commands.sweeps import Sweeps, sweeps_from
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_whole
-from exneat_cli.records import read_yaml
-from exneat_cli.runs import RunSettings, check_sweeps, is_finished
+from exneat_cli.commands.command_line import CommandLine, as_written, read_setting, shipped_directory
+from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.commands.jobs import BUDGETS, Job, read_job
+from exneat_cli.errors import (
+    ConfigError,
+    ExneatError,
+    check_choice,
+    check_flag,
+    check_keys,
+    check_section,
+    check_text,
+    check_whole,
+)
+from exneat_cli.records import build
 
-_FIELDS = {
-    "claim": (str,),
-    "settings": (Mapping,),
-    "variants": (Mapping,),
-    "conditions": (Mapping,),
-    "runs": (Mapping,),
-}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
 _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "hydra"}
-"""What the launcher sets itself, so that no variant or condition may."""
+"""What exneat sweep sets itself, so that no variant or condition may."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Variant:
 
     Attributes:
         label: for legends and tables.
-        settings: overrides, as on the command line.
+        settings: by dotted name, as on the command line.
         runs: number of seeds; None takes the experiment's.
         swept: whether its runs are tested for robustness.
     """
@@ -50,11 +51,11 @@ class Variant:
 
 @dataclass(frozen=True)
 class Condition:
-    """One training condition: its label, overrides, and the robustness sweeps that its runs go through."""
+    """One training condition: its label, settings, and the robustness sweeps that its runs go through."""
 
     label: str
     settings: Mapping[str, Any]
-    sweeps: tuple[str, ...] = ()
+    sweeps: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Experiment:
     Attributes:
         name: of the file.
         claim: what it is to show.
-        settings: overrides for all of its runs.
+        settings: of all its runs.
         variants: by name; the others are compared with the first.
         conditions: by name.
         runs: budget -> number of seeds of each variant, 0, 1, 2, ...
@@ -78,44 +79,13 @@ class Experiment:
     runs: Mapping[str, int]
 
 
-@dataclass(frozen=True)
-class Job:
-    """One run of an experiment: where it stands, its settings, and its robustness sweeps."""
-
-    condition: str
-    variant: str
-    settings: RunSettings
-    sweeps: Sweeps
-
-    @property
-    def name(self) -> str:
-        """The job in one word, e.g. ``noise_0.05/neat/3``."""
-        return f"{self.condition}/{self.variant}/{self.settings.seed}"
-
-    def is_finished(self) -> bool:
-        """Whether the run is done and was tested at every level; a damaged one is not."""
-        try:
-            return is_finished(self.settings, self.sweeps.sweeps, self.sweeps.episodes)
-        except ExneatError:
-            return False
-
-    def is_drawn(self) -> bool:
-        """Whether all figures of the finished run are there."""
-        return not missing_figures(self.settings.directory, swept=bool(self.sweeps.sweeps))
-
-
-def experiments_directory() -> Path:
-    """experiments/, see `shipped_directory`."""
-    return shipped_directory("experiments")
-
-
 def experiment_names() -> list[str]:
     """Names of the experiments that come with exneat."""
-    return sorted(path.stem for path in experiments_directory().glob("*.yaml") if path.stem != "catalogue")
+    return sorted(path.stem for path in shipped_directory("experiments").glob("*.yaml") if path.stem != "catalogue")
 
 
-def read_experiment(name: str) -> Experiment:
-    """The experiment of that name, or the one in a YAML file of the user's own.
+def read_experiment(name: object) -> Experiment:
+    """Read the experiment of that name, or the one in a YAML file of the user's own.
 
     Args:
         name: one of `experiment_names`, or a path that ends in ``.yaml``.
@@ -123,96 +93,82 @@ def read_experiment(name: str) -> Experiment:
     Raises:
         ExneatError: there is no such experiment, or its file is damaged or makes no sense.
     """
-    own = name.endswith((".yaml", ".yml"))
+    own = isinstance(name, str) and name.endswith((".yaml", ".yml"))
     if not own and name not in experiment_names():
         raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
-    path = Path(name) if own else experiments_directory() / f"{name}.yaml"
-    content = read_yaml(path)
+    path = Path(str(name)) if own else shipped_directory("experiments") / f"{name}.yaml"
     try:
-        return _experiment(path.stem, _known("the file", content, _FIELDS))
+        content: Any = OmegaConf.to_container(OmegaConf.load(path))
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be read: {error.strerror or error}") from error
+    except (ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
+        raise ExneatError(in_words(error, [path.parent])) from error
+    try:
+        return _experiment(path.stem, content)
     except ExneatError as error:
         raise ExneatError(f"{path}: {error}") from error
 
 
-def _known(key: str, values: object, fields: Mapping[str, tuple[type, ...]]) -> Mapping[str, Any]:
-    """Check a section's keys and the types of its values; those marked with None may be left out."""
-    if not isinstance(values, Mapping):
-        raise ConfigError(key, f"keys with values: {', '.join(fields)}", values)
-    for name in values:
-        if name not in fields:
-            raise ExneatError(f"{key}: {name}: unknown key; known here: {', '.join(fields)}")
-    for name, types in fields.items():
-        if name not in values and type(None) not in types:
-            raise ExneatError(f"{key}: {name} is missing")
-        if not isinstance(values.get(name), types):
-            expected = " or ".join(each.__name__ for each in types if each is not type(None))
-            raise ConfigError(f"{key}: {name}", f"a value of type {expected}", values[name])
-    return values
-
-
-def _experiment(name: str, content: Mapping[str, Any]) -> Experiment:
-    variants, conditions = content["variants"], content["conditions"]
-    for part, entries in (("variants", variants), ("conditions", conditions)):
-        if not entries:
-            raise ConfigError(part, "at least one entry", entries)
-    for key in (name, *variants, *conditions):
+def _experiment(name: str, content: Any) -> Experiment:
+    check_keys("", check_section("the file", content), ("claim", "settings", "variants", "conditions", "runs"))
+    experiment = build(Experiment, {**content, "name": name}, "")
+    check_text("claim", experiment.claim)
+    for part in ("variants", "conditions", "runs"):
+        if not check_section(part, content[part]):
+            raise ConfigError(part, "at least one entry", content[part])
+    for key in (name, *experiment.variants, *experiment.conditions):
         if not isinstance(key, str) or not _NAME.fullmatch(key):
             raise ConfigError("name", "at most 40 letters, digits, '.', '_' and '-'", key)
-    if not content["runs"]:
-        raise ConfigError("runs", f"a number of runs for one of {', '.join(BUDGETS)}", content["runs"])
-    for budget, runs in content["runs"].items():
+    for budget, runs in experiment.runs.items():
         check_choice("runs", budget, BUDGETS)
         check_whole(f"runs.{budget}", runs, 1, 10_000)
-    return Experiment(
-        name=name,
-        claim=content["claim"],
-        settings=_overrides("settings", content["settings"]),
-        variants={key: _variant(f"variants.{key}", entry) for key, entry in variants.items()},
-        conditions={key: _condition(f"conditions.{key}", entry) for key, entry in conditions.items()},
-        runs=dict(content["runs"]),
+    return replace(
+        experiment,
+        settings=_flat("settings", experiment.settings),
+        variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
+        conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
 
 
-def _variant(key: str, entry: object) -> Variant:
-    fields = {"label": (str,), "settings": (Mapping,), "runs": (int, type(None)), "swept": (bool, type(None))}
-    values = _known(key, entry, fields)
-    if values.get("runs") is not None:
-        check_whole(f"{key}.runs", values["runs"], 1, 10_000)
-    return Variant(**{**values, "settings": _overrides(f"{key}.settings", values["settings"])})
+def _variant(key: str, entry: Any) -> Variant:
+    variant = build(Variant, entry, f"{key}.")
+    check_text(f"{key}.label", variant.label)
+    check_flag(f"{key}.swept", variant.swept)
+    if variant.runs is not None:
+        check_whole(f"{key}.runs", variant.runs, 1, 10_000)
+    return replace(variant, settings=_flat(f"{key}.settings", variant.settings))
 
 
-def _condition(key: str, entry: object) -> Condition:
-    values = _known(key, entry, {"label": (str,), "settings": (Mapping,), "sweeps": (list, type(None))})
-    sweeps = values.get("sweeps") or []
-    for sweep in sweeps:
-        if not isinstance(sweep, str):
-            raise ConfigError(f"{key}.sweeps", "names of sweeps", sweep)
-    return Condition(values["label"], _overrides(f"{key}.settings", values["settings"]), tuple(sweeps))
+def _condition(key: str, entry: Any) -> Condition:
+    condition = build(Condition, entry, f"{key}.")
+    check_text(f"{key}.label", condition.label)
+    if not isinstance(condition.sweeps, list) or not all(isinstance(sweep, str) for sweep in condition.sweeps):
+        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", condition.sweeps)
+    return replace(condition, settings=_flat(f"{key}.settings", condition.settings))
 
 
-def _overrides(key: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+def _flat(key: str, values: Any) -> dict[str, Any]:
     """Settings by dotted name; sections within sections are spelled out."""
     flat: dict[str, Any] = {}
-    for name, value in values.items():
-        section = str(name).lstrip("+~").partition(".")[0].partition("/")[0]
-        if section in _SET_HERE:
+    for name, value in check_section(key, values).items():
+        if re.split("[./]", str(name).lstrip("+~"))[0] in _SET_HERE:
             raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
-        if isinstance(value, Mapping):
-            flat.update({f"{name}.{inner}": each for inner, each in _overrides(f"{key}.{name}", value).items()})
-        elif value is None or isinstance(value, str | int | float | list):
-            flat[str(name)] = value
-        else:
-            raise ConfigError(f"{key}.{name}", "a word, a number, true, false, null or a list", value)
+        inner = _flat(f"{key}.{name}", value) if isinstance(value, Mapping) else {"": value}
+        flat.update({f"{name}.{rest}".rstrip("."): each for rest, each in inner.items()})
     return flat
 
 
-def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()) -> list[Job]:
-    """Every run of an experiment, condition by condition and variant by variant.
+def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
+    """Plan every run of an experiment, condition by condition and variant by variant.
 
     Args:
         experiment: what is compared.
         budget: ``paper``, ``quick`` or ``smoke``.
-        overrides: the user's own, for all runs; they win.
+        line: its settings are the user's own for all runs, and win.
+        others: those that are none of the runs.
+
+    Returns:
+        Jobs that are called ``<condition>/<variant>/<seed>``.
 
     Raises:
         ExneatError: settings make no sense, in at least one of the runs.
@@ -220,13 +176,12 @@ def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()
     if budget not in experiment.runs:
         raise ConfigError("budget", f"one that {experiment.name} has runs for, {', '.join(experiment.runs)}", budget)
     jobs: list[Job] = []
-    with composing() as compose:
-        for condition in experiment.conditions:
-            for variant in experiment.variants:
-                try:
-                    jobs += _jobs(experiment, condition, variant, budget, overrides, compose)
-                except ExneatError as error:
-                    raise ExneatError(f"{experiment.name}, {condition}, {variant}: {error}") from error
+    for condition in experiment.conditions:
+        for variant in experiment.variants:
+            try:
+                jobs += _jobs(experiment, condition, variant, budget, line, others)
+            except ExneatError as error:
+                raise ExneatError(f"{experiment.name}, {condition}, {variant}: {error}") from error
     places: dict[Path, Job] = {}
     for job in jobs:
         twin = places.setdefault(job.settings.directory.path, job)
@@ -236,39 +191,19 @@ def plan_jobs(experiment: Experiment, budget: str, overrides: Sequence[str] = ()
 
 
 def _jobs(
-    experiment: Experiment,
-    condition: str,
-    variant: str,
-    budget: str,
-    overrides: Sequence[str],
-    compose: Callable[[Sequence[str]], DictConfig],
+    experiment: Experiment, condition: str, variant: str, budget: str, line: CommandLine, others: Sequence[str]
 ) -> Iterable[Job]:
     chosen, where = experiment.variants[variant], experiment.conditions[condition]
-    sweeps = f"[{','.join(where.sweeps)}]" if where.sweeps and chosen.swept else "none"
-    settings = {**experiment.settings, **where.settings, **chosen.settings}
-    config = compose(
-        [
-            *(f"{key}={value if isinstance(value, str) else json.dumps(value)}" for key, value in settings.items()),
-            f"budget={budget}",
-            f"sweep={sweeps}",
-            f"name={experiment.name}-{condition}-{budget}",
-            *overrides,
-        ]
-    )
-    first = settings_from(config)
-    asked = sweeps_from(config, first.task.name)
-    check_sweeps(first, asked.sweeps, asked.episodes)
-    seeds = range(chosen.runs or experiment.runs[budget])
-    return [Job(condition, variant, dataclasses.replace(first, seed=first.seed + k), asked) for k in seeds]
-
-
-def budget_of(overrides: Sequence[str]) -> tuple[str | None, list[str]]:
-    """The ``budget=`` among overrides, and the others."""
-    chosen, rest = None, []
-    for override in overrides:
-        key, _, value = override.partition("=")
-        if key == "budget":
-            chosen = value
-        else:
-            rest.append(override)
-    return chosen, rest
+    settings = {
+        **experiment.settings,
+        **where.settings,
+        **chosen.settings,
+        "sweep": (where.sweeps if chosen.swept else None) or "none",
+        "name": f"{experiment.name}-{condition}-{budget}",
+    }
+    texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
+    composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
+    first = read_job("", composed, others)
+    for k in range(chosen.runs or experiment.runs[budget]):
+        seeded = replace(first.settings, seed=first.settings.seed + k)
+        yield Job(f"{condition}/{variant}/{seeded.seed}", seeded, first.sweeps)

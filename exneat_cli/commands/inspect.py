@@ -6,27 +6,26 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from exneat_cli.algorithms import BASELINES
-from exneat_cli.errors import ExneatError
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.errors import ExneatError, check_keys, check_text
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, is_held, read_champion
 from exneat_cli.wiring import Module
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(line: CommandLine) -> int:
     """Print the wiring of ``run=<directory>``, or the runs below ``output=<directory>``.
 
     Raises:
-        ExneatError: an argument is unknown, or the run has no champion to show.
+        ExneatError: an argument makes no sense, or the run has no champion to show.
     """
-    values = {"output": "outputs"}
-    for argument in arguments:
-        key, separator, value = argument.partition("=")
-        if key not in ("run", "output") or not separator or not value:
-            raise ExneatError(f"{argument}: expected run=<run directory> or output=<root of runs>")
-        values[key] = value
-    if "run" in values:
-        _show(RunDirectory(Path(values["run"])))
+    plain = line.compose()
+    check_keys("", plain, ("run", "output"))
+    if plain["run"] is not None:
+        check_text("run", plain["run"], "a run directory")
+        _show(RunDirectory(Path(plain["run"])))
     else:
-        _list(Path(values["output"]))
+        check_text("output", plain["output"], "a directory")
+        _list(Path(plain["output"]))
     return 0
 
 
@@ -59,11 +58,8 @@ def _show_module(champion: Champion, module: Module) -> None:
         print(f"  reads    {line}")
     drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
     print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
-    print(
-        f"  network  {len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs, ",
-        end="",
-    )
-    print(f"{enabled} enabled of {len(genome.connections)} connections\n")
+    sizes = f"{len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs"
+    print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
 
 
 def _links(champion: Champion, module: Module) -> Iterable[str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,23 +13,20 @@ from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_comparison, build_table
-from exneat_cli.commands.composition import BUDGETS
-from exneat_cli.commands.experiments import (
-    Experiment,
-    Job,
-    experiment_names,
-    experiments_directory,
-    plan_jobs,
-    read_experiment,
-)
-from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.records import RunDirectory
+from exneat_cli.commands.command_line import CommandLine, shipped_directory
+from exneat_cli.commands.experiments import Experiment, experiment_names, plan_jobs, read_experiment
+from exneat_cli.commands.jobs import BUDGETS, Job
+from exneat_cli.errors import ExneatError, check_choice, check_text
+from exneat_cli.records import RunDirectory, build
 from exneat_cli.tasks import HasFullReward
+
+_OWN = ("experiment", "only", "axis")
+"""Settings of the report that are none of its runs."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the command line asks for.
+    """What conf/report.yaml says, and the command line.
 
     Attributes:
         experiment: a name or a YAML file; None takes all that come with exneat.
@@ -36,15 +34,17 @@ class Request:
         only: one figure or table; None takes all.
         axis: horizontal axis of training curves.
         output: root of all run directories.
-        overrides: settings that all runs were given on the command line.
     """
 
-    experiment: str | None = None
-    budget: str | None = None
-    only: str | None = None
-    axis: str = "generation"
-    output: str = "outputs"
-    overrides: tuple[str, ...] = ()
+    experiment: str | None
+    budget: str | None
+    only: str | None
+    axis: str
+    output: str
+
+    def __post_init__(self) -> None:
+        check_choice("axis", self.axis, AXES)
+        check_text("output", self.output, "a directory")
 
     @property
     def directory(self) -> Path:
@@ -53,20 +53,20 @@ class Request:
         return report if self.experiment is None else report / Path(self.experiment).stem
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(line: CommandLine) -> int:
     """Build what can be built, and say what is missing; returns the exit code.
 
     Raises:
         ExneatError: an argument makes no sense, there are no runs, or the one thing asked for lacks runs.
     """
-    request = _request(arguments)
-    artefacts = _artefacts(request)
-    names = sorted({e for artefact in artefacts.values() for e in _experiments_of(artefact)})
-    experiments = {name: read_experiment(name) for name in names if name in experiment_names()}
-    if request.experiment is not None:
-        own = read_experiment(request.experiment)
-        experiments[own.name] = own
-    studies = {name: _study(experiments[name], request) for name in names}
+    request = build(Request, line.compose("budget", "output", *_OWN), "")
+    experiment = None if request.experiment is None else read_experiment(request.experiment)
+    artefacts = _artefacts(request, experiment)
+    names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})
+    experiments = {name: read_experiment(name) for name in names if experiment is None or name != experiment.name}
+    if experiment is not None:
+        experiments[experiment.name] = experiment
+    studies = {name: _study(experiments[name], request, line) for name in names}
     if not any(study.finished for study in studies.values()):
         where = f"output={request.output}: no finished run of {', '.join(names)}"
         raise ExneatError(f"{where}\n  {next(iter(studies.values())).command}")
@@ -79,32 +79,13 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _request(arguments: Sequence[str]) -> Request:
-    known = ("experiment", "budget", "only", "axis", "output")
-    values: dict[str, str] = {}
-    overrides = []
-    for argument in arguments:
-        key, separator, value = argument.partition("=")
-        if argument.startswith("-") or not separator or not value:
-            raise ExneatError(f"{argument}: expected key=value; keys are {', '.join(known)} and settings of the runs")
-        if key in known:
-            values[key] = value
-        else:
-            overrides.append(argument)
-    request = Request(**values, overrides=tuple(overrides))
-    check_choice("axis", request.axis, AXES)
-    if request.budget is not None:
-        check_choice("budget", request.budget, BUDGETS)
-    return request
-
-
-def _artefacts(request: Request) -> dict[str, FigurePlan | TablePlan]:
+def _artefacts(request: Request, experiment: Experiment | None) -> dict[str, FigurePlan | TablePlan]:
     """What is to be built: from the catalogue, or, for an experiment that is not in it, one figure for each thing."""
-    catalogue = read_catalogue(experiments_directory() / "catalogue.yaml")
-    if request.experiment is not None:
-        experiment = read_experiment(request.experiment)
-        chosen = {name: each for name, each in catalogue.items() if experiment.name in _experiments_of(each)}
-        catalogue = chosen if request.experiment in experiment_names() else _figures_for(experiment)
+    catalogue = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
+    if experiment is not None and request.experiment in experiment_names():
+        catalogue = {name: each for name, each in catalogue.items() if experiment.name in _experiments_of(each)}
+    elif experiment is not None:
+        catalogue = _figures_for(experiment)
     if request.only is None:
         return catalogue
     check_choice("only", request.only, list(catalogue))
@@ -112,17 +93,15 @@ def _artefacts(request: Request) -> dict[str, FigurePlan | TablePlan]:
 
 
 def _figures_for(experiment: Experiment) -> dict[str, FigurePlan | TablePlan]:
-    plans: dict[str, FigurePlan | TablePlan] = {}
+    plans: list[FigurePlan] = []
     for name, condition in experiment.conditions.items():
-        training = f"training-{name}"
-        plans[training] = FigurePlan(
-            training, "training", f"{condition.label}: training", (Panel(experiment.name, name),)
-        )
-        for sweep in condition.sweeps:
-            swept = f"robustness-{name}-{sweep}"
+        panel = Panel(experiment.name, name)
+        plans.append(FigurePlan(f"training-{name}", "training", f"{condition.label}: training", (panel,)))
+        for sweep in condition.sweeps or ():
             panel = Panel(experiment.name, name, sweep=sweep)
-            plans[swept] = FigurePlan(swept, "robustness", f"{condition.label}: {sweep}", (panel,))
-    return plans
+            title = f"{condition.label}: {sweep}"
+            plans.append(FigurePlan(f"robustness-{name}-{sweep}", "robustness", title, (panel,)))
+    return {plan.name: plan for plan in plans}
 
 
 def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
@@ -130,38 +109,46 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
     return [part.experiment for part in parts]  # type: ignore[attr-defined]
 
 
-def _planned(job: Job) -> PlannedRun:
-    settings = job.settings
-    return PlannedRun(job.condition, job.variant, settings.seed, settings.directory, settings.trained_generations)
-
-
-def _study(experiment: Experiment, request: Request) -> Study:
+def _study(experiment: Experiment, request: Request, line: CommandLine) -> Study:
     budget = request.budget or _largest_budget(experiment, request.output)
-    jobs = plan_jobs(experiment, budget, [f"output={request.output}", *request.overrides])
+    jobs = plan_jobs(experiment, budget, line, _OWN)
     task = jobs[0].settings.task
-    labels: dict[str, str] = {}
-    levels: dict[str, tuple[float, ...]] = {}
-    for job in jobs:
-        labels.update(job.sweeps.labels)
-        levels.update({sweep.name: sweep.levels for sweep in job.sweeps.sweeps})
-    of_their_own = request.experiment is not None and Path(request.experiment).stem == experiment.name
-    name = request.experiment if of_their_own else experiment.name
-    extra = [f"output={request.output}"] if request.output != "outputs" else []
+    swept = [job for job in jobs if job.sweeps.sweeps]
     return Study(
         experiment=experiment.name,
         budget=budget,
         claim=experiment.claim,
-        command=" ".join(["exneat sweep", f"experiment={name}", f"budget={budget}", *extra, *request.overrides]),
+        command=_sweep_command(experiment, request, line, budget),
         fitness_name=task.fitness_name,
         has_full_reward=isinstance(task, HasFullReward),
         variants={name: variant.label for name, variant in experiment.variants.items()},
-        baselines=tuple(dict.fromkeys(job.variant for job in jobs if job.settings.algorithm.rule)),
+        baselines=tuple(dict.fromkeys(_place(job)[1] for job in jobs if job.settings.algorithm.rule)),
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
-        sweeps=labels,
+        sweeps={name: label for job in swept for name, label in job.sweeps.labels.items()},
         runs=tuple(_planned(job) for job in jobs),
-        levels=levels,
-        sweep_episodes=next((job.sweeps.episodes for job in jobs if job.sweeps.sweeps), None),
+        levels={sweep.name: sweep.levels for job in swept for sweep in job.sweeps.sweeps},
+        sweep_episodes=swept[0].sweeps.episodes if swept else None,
     )
+
+
+def _place(job: Job) -> tuple[str, str]:
+    """Condition and variant."""
+    condition, variant, _ = job.name.split("/")
+    return condition, variant
+
+
+def _planned(job: Job) -> PlannedRun:
+    settings = job.settings
+    return PlannedRun(*_place(job), settings.seed, settings.directory, settings.trained_generations)
+
+
+def _sweep_command(experiment: Experiment, request: Request, line: CommandLine, budget: str) -> str:
+    """The command line that does what is missing."""
+    is_own = request.experiment is not None and Path(request.experiment).stem == experiment.name
+    name = request.experiment if is_own else experiment.name
+    places = [] if request.output == "outputs" else [f"output={request.output}"]
+    others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
+    return shlex.join(["exneat", "sweep", f"experiment={name}", f"budget={budget}", *places, *others])
 
 
 def _largest_budget(experiment: Experiment, output: str) -> str:

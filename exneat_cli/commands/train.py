@@ -1,63 +1,47 @@
-"""`exneat train`: one run, or with -m one run per combination."""
+"""`exneat train`: one run, or with -m one run per combination of the settings that have several values."""
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Sequence
 
-from hydra.core.hydra_config import HydraConfig
-from hydra.types import RunMode
-from omegaconf import DictConfig
-
-from exneat_cli.commands.composition import run_composed, settings_from
-from exneat_cli.commands.drawing import draw_what_is_missing
-from exneat_cli.commands.sweeps import sweeps_from
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.jobs import Job, read_job
+from exneat_cli.commands.launching import run_jobs
 from exneat_cli.errors import ExneatError
-from exneat_cli.runs import check_sweeps, progress_for_terminal, run_robustness, train
+from exneat_cli.runs import progress_for_terminal
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(line: CommandLine) -> int:
     """Train; returns the exit code.
 
     Raises:
         ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
-
-    def job(config: DictConfig) -> None:
+    if not line.multirun and not line.launcher:
+        _train(line.words, read_job("train", line.compose()), go_on=False)
+        return 0
+    jobs, failures = [], []
+    for name, each in line.combinations().items():
         try:
-            _train(config, arguments)
+            jobs.append(read_job(name or "train", each.compose()))
         except ExneatError as error:
-            if HydraConfig.get().mode is RunMode.MULTIRUN:
-                # Raised again at the end of the multirun by Hydra, with its reason: what a job prints on another
-                # machine stays in a log there.
-                print(f"exneat: {' '.join(HydraConfig.get().overrides.task)}: {error}", file=sys.stderr)
-                reason = str(error).splitlines()[0]
-                raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}") from error
-            raise
-
-    run_composed("exneat train", arguments, job)
+            failures.append(str(error))
+            print(f"exneat: {name or 'train'}: {error}", file=sys.stderr)
+    work = functools.partial(_train, line.words, go_on=line.multirun)
+    failures += filter(None, run_jobs(work, jobs, line) if jobs else [])
+    if failures:
+        reason = failures[0].splitlines()[0]
+        raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}")
     return 0
 
 
-def _train(config: DictConfig, arguments: Sequence[str]) -> None:
-    settings = settings_from(config)
-    asked = sweeps_from(config, settings.task.name)
-    check_sweeps(settings, asked.sweeps, asked.episodes)
-    again = HydraConfig.get().mode is RunMode.MULTIRUN
-    command = ["exneat", "train", *arguments]
-    finished = train(settings, progress=progress_for_terminal(), command=command, go_on=again)
+def _train(command: Sequence[str], job: Job, *, go_on: bool) -> None:
+    finished = job.do(progress_for_terminal(), command, go_on=go_on)
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")
-    if asked.sweeps:
-        run_robustness(
-            directory,
-            asked.sweeps,
-            episodes=asked.episodes,
-            executor=settings.executor,
-            progress=progress_for_terminal(),
-        )
-    draw_what_is_missing(directory, settings.task.fitness_name, asked.labels)
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

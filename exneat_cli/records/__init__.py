@@ -1,6 +1,6 @@
 """Everything on disk: layout, columns, champions, checkpoints, manifests, locks."""
 
-from exneat_cli.records import disk, provenance
+from exneat_cli.records import provenance
 from exneat_cli.records.champion import Champion, Genome, Scores, read_champion, write_hall_of_fame
 from exneat_cli.records.checkpoint import Checkpoint, read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, write_csv, write_json, write_whole
@@ -19,7 +19,7 @@ from exneat_cli.records.manifest import (
 from exneat_cli.records.plain import build, converted
 from exneat_cli.records.robustness import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
 from exneat_cli.records.run_directory import RunDirectory, configuration_hash, find_runs
-from exneat_cli.records.yaml_files import check_yaml, read_yaml
+from exneat_cli.records.yaml_files import read_yaml
 
 __all__ = [
     "DONE",
@@ -40,10 +40,8 @@ __all__ = [
     "Score",
     "Scores",
     "build",
-    "check_yaml",
     "configuration_hash",
     "converted",
-    "disk",
     "find_runs",
     "is_held",
     "make_directory",

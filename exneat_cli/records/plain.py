@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Meta
 
-from exneat_cli.errors import ConfigError, ExneatError, shortened
+from exneat_cli.errors import ExneatError, check_keys, check_section, shortened
 from exneat_cli.records.files import read_text
 
 Word = Annotated[str, Meta(pattern=r"^[\w -~]{1,200}\Z")]
@@ -93,19 +91,14 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
         ConfigError: `values` is no mapping, or whatever `kind` says of them.
         ExneatError: a key is unknown, named with the nearest valid one, or missing.
     """
-    if not isinstance(values, Mapping):
-        raise ConfigError(prefix.rstrip("."), "a section with keys of its own", values)
+    section = check_section(prefix.rstrip("."), values)
     fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    for key, value in values.items():
-        if key not in fields:
-            close = difflib.get_close_matches(str(key), fields, n=1, cutoff=0.5)
-            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(fields)
-            raise ExneatError(f"{prefix}{ascii(str(key))[1:-1][:60]}: unknown key (value {shortened(value)})\n  {hint}")
+    check_keys(prefix, section, fields)
     for name, field in fields.items():
-        if name not in values and field.default is field.default_factory is dataclasses.MISSING:
+        if name not in section and field.default is field.default_factory is dataclasses.MISSING:
             raise ExneatError(f"{prefix}{name}: is missing")
     hints = get_type_hints(kind)
-    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in values.items()})
+    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in section.items()})
 
 
 def _made(hint: Any, value: Any, key: str) -> Any:

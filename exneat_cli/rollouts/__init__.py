@@ -2,9 +2,8 @@
 
 from exneat_cli.rollouts.cluster import keep_clusters
 from exneat_cli.rollouts.executor import Executor
-from exneat_cli.rollouts.noise import Noise
 from exneat_cli.rollouts.outcomes import Outcomes, Trace
-from exneat_cli.rollouts.robustness import Sweep, perturbed, run_levels
+from exneat_cli.rollouts.perturbation import Noise, Sweep, perturbed
 from exneat_cli.rollouts.runner import Runner
 
 __all__ = [
@@ -16,5 +15,4 @@ __all__ = [
     "Trace",
     "keep_clusters",
     "perturbed",
-    "run_levels",
 ]

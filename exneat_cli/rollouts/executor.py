@@ -19,8 +19,8 @@ class Executor:
 
     Attributes:
         name: ``threads``, ``serial`` for one thread, or ``dask`` for the worker processes of a cluster.
-        workers: number of threads, or of processes with one thread each; 0 takes every core this process may
-            use. A cluster at an address has workers of its own: 0 there.
+        workers: number of threads, or of processes with one thread each, one at most if serial; 0 takes every core
+            this process may use. A cluster at an address has workers of its own: 0 there.
         address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
             this machine.
 
@@ -34,7 +34,7 @@ class Executor:
 
     def __post_init__(self) -> None:
         check_choice("executor.name", self.name, EXECUTORS)
-        check_whole("executor.workers", self.workers, 0, 4096)
+        check_whole("executor.workers", self.workers, 0, 1 if self.name == "serial" else 4096)
         if self.address is None:
             return
         if self.name != "dask":

@@ -4,7 +4,7 @@ from exneat_cli.runs.progress import Lines, Progress, progress_for_terminal
 from exneat_cli.runs.robustness import check_sweeps, is_finished, load_settings, run_robustness
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
-from exneat_cli.runs.settings import RunSettings, executor_from
+from exneat_cli.runs.settings import RunSettings
 
 __all__ = [
     "Finished",
@@ -12,7 +12,6 @@ __all__ = [
     "Progress",
     "RunSettings",
     "check_sweeps",
-    "executor_from",
     "is_finished",
     "load_settings",
     "progress_for_terminal",

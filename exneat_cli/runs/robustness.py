@@ -19,7 +19,7 @@ from exneat_cli.records import (
     read_robustness,
     read_yaml,
 )
-from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
@@ -112,10 +112,12 @@ def run_robustness(
             if not levels:
                 continue
             (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
-            todo = Sweep(sweep.name, sweep.parameter, levels)
-            seeds = unseen_episodes(settings, episodes)
-            tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
-            _write(directory, settings, sweep, {level: score_all(outcomes)[0] for level, outcomes in tested})
+            seeds, scores = unseen_episodes(settings, episodes), {}
+            for level in levels:
+                changed = perturbed(settings.task, settings.noise, sweep, level)
+                with Runner(*changed, executor, training=False) as runner:
+                    (scores[level],) = score_all(runner.run(acting, seeds))
+            _write(directory, settings, sweep, scores)
             done += len(levels)
     return done
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
-from exneat_cli.errors import ConfigError, check_choice, check_flag, check_whole
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
@@ -79,8 +79,7 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
-        if not isinstance(self.output, str) or not self.output or not self.output.isprintable():
-            raise ConfigError("output", "a directory, without control characters", self.output)
+        check_text("output", self.output, "a directory, without control characters")
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
@@ -149,10 +148,9 @@ class RunSettings:
 
 def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:
     """One of several dataclasses, by the ``name`` in its section."""
-    if not isinstance(values, Mapping):
-        raise ConfigError(key, "a section with keys of its own", values)
-    check_choice(key, values.get("name"), list(registry))
-    return build(registry[values["name"]], values, f"{key}.")
+    section = check_section(key, values)
+    check_choice(key, section.get("name"), list(registry))
+    return build(registry[section["name"]], section, f"{key}.")
 
 
 def executor_from(plain: object) -> Executor:

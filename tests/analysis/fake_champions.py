@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import msgspec
+
+from exneat_cli.analysis.network_data import ChampionGraph, champion_graph
+from exneat_cli.records import Champion
+
 
 def reads(index: int, module: int = -1, *, delayed: bool = False) -> dict[str, Any]:
     """A pin: an entry of the observation, or a node of a module."""
@@ -43,10 +48,21 @@ def a_champion(
         "task": {"name": "made_up"},
         "actuators": list(actuators),
         "feed_forward": True,
-        "scores": {"test": {"fitness_mean": 0.75, "fitness_std": 0.1, "episodes": 20}},
+        "scores": {"test": a_score(0.75, 0.75)},
         "plan": {"modules": list(modules), "observation_size": sensors, "action_size": len(actuators)},
         "genomes": list(genomes),
     }
+
+
+def a_score(fitness: float, full_reward: float) -> dict[str, Any]:
+    """Figures of a brain on 20 episodes."""
+    means = {"fitness_mean": fitness, "full_reward_mean": full_reward}
+    return {"episodes": 20, **means, "fitness_std": 0.1, "full_reward_std": 0.1, "failed_episodes": 0, "fitness": []}
+
+
+def graph_of(content: dict[str, Any]) -> ChampionGraph:
+    """The graph of what champion.json would hold."""
+    return champion_graph(msgspec.convert(content, Champion))
 
 
 def grid_champion() -> dict[str, Any]:
@@ -66,22 +82,17 @@ def modular_champion() -> dict[str, Any]:
 
     The back right leg's output is read by nothing.
     """
-    places = {
-        "front_left": (0.2, 0.2),
-        "front_right": (0.2, -0.2),
-        "back_left": (-0.2, 0.2),
-        "back_right": (-0.2, -0.2),
-    }
+    places = [(0.2, 0.2), (0.2, -0.2), (-0.2, 0.2), (-0.2, -0.2)]
     legs = [
         a_module(
-            name,
-            place,
+            f"{'front' if x > 0 else 'back'}_{'left' if y > 0 else 'right'}",
+            (x, y),
             0,
             pins=[reads(2 * k), reads(2 * k + 1), reads(1, (k + 1) % 4, delayed=True)],
             outputs=1,
             hidden=1,
         )
-        for k, (name, place) in enumerate(places.items())
+        for k, (x, y) in enumerate(places)
     ]
     pins = [reads(8), *(reads(0, leg) for leg in range(3))]
     central = a_module("central", (0.0, 0.0), 1, pins=pins, outputs=2, drives=[0, 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from exneat_cli.analysis.study import PlannedRun, Study
 from exneat_cli.records import (
     DONE,
+    MANIFEST_FORMAT,
     RobustnessRow,
     RunDirectory,
     merge_robustness,
@@ -18,12 +20,13 @@ from exneat_cli.records import (
     write_json,
 )
 from exneat_cli.records.history import COLUMNS
-from tests.analysis.fake_champions import grid_champion, modular_champion
+from tests.analysis.fake_champions import a_score, grid_champion, modular_champion
 
 Levels = Mapping[tuple[str, float], tuple[float, float]]
 """(sweep, level) -> mean fitness and mean full reward."""
 LEVELS = tuple(round(0.1 * k, 1) for k in range(6))
 SWEEPS = {"sensor_noise": "sensor noise (sd)", "gap": "gap before the goal (tiles)"}
+CONDITIONS = {"calm": "no noise", "noisy": "much noise"}
 VARIANTS = {"neat": "NEAT", "exneat": "ExNEAT", "random": "random actions"}
 
 
@@ -32,14 +35,12 @@ def plan_study(
     *,
     variants: Mapping[str, str] = VARIANTS,
     baselines: Sequence[str] = ("random",),
-    conditions: Mapping[str, str] | None = None,
+    conditions: Mapping[str, str] = CONDITIONS,
     seeds: int = 3,
     experiment: str = "track",
-    budget: str = "quick",
     has_full_reward: bool = False,
 ) -> Study:
     """A study none of whose runs is finished."""
-    conditions = conditions or {"calm": "no noise", "noisy": "much noise"}
     runs = tuple(
         PlannedRun(condition, variant, seed, RunDirectory(directory / experiment / f"{condition}-{variant}-s{seed}"))
         for condition in conditions
@@ -48,9 +49,9 @@ def plan_study(
     )
     return Study(
         experiment=experiment,
-        budget=budget,
+        budget="quick",
         claim="Small networks learn faster.",
-        command=f"exneat sweep experiment={experiment} budget={budget}",
+        command=f"exneat sweep experiment={experiment} budget=quick",
         fitness_name="forward reward" if has_full_reward else "fitness",
         has_full_reward=has_full_reward,
         variants=variants,
@@ -76,14 +77,22 @@ def finish(
     levels: Levels | None = None,
     episodes: int = 400,
     env_steps: int = 9000,
-    versions: Mapping[str, str] | None = None,
+    version: str = "0.1.0",
 ) -> None:
     """Write what a finished run leaves; without a curve it is that of a baseline."""
     directory = run.directory
     directory.path.mkdir(parents=True)
-    champion = {"episodes": 20, "fitness_mean": test, "fitness_std": 0.1, "full_reward_mean": full_reward}
-    result: dict[str, object] = {"champion": champion}
-    manifest: dict[str, object] = {"status": DONE, "versions": dict(versions or {"exneat": "0.1.0", "numpy": "2.4.6"})}
+    result: dict[str, object] = {"champion": a_score(test, full_reward), "standing_still": a_score(0.0, 0.0)}
+    manifest: dict[str, object] = {
+        "format": MANIFEST_FORMAT,
+        "status": DONE,
+        "variant": run.variant,
+        "task": "made_up",
+        "seed": run.seed,
+        "configuration_hash": "0",
+        "generations": len(curve),
+        "versions": {"exneat": version, "numpy": "2.4.6"},
+    }
     if curve:
         per_generation = env_steps // len(curve)
         rows = [
@@ -118,6 +127,11 @@ def falling(height: float) -> Levels:
     """All levels of all sweeps: fitness falls with the level, and full reward is twice as high."""
     heights = {(sweep, level): height * (1.0 - level) for sweep in SWEEPS for level in LEVELS}
     return {place: (fitness, 2 * fitness) for place, fitness in heights.items()}
+
+
+def a_study(directory: Path, **options: Any) -> Study:
+    """All runs finished, with all levels."""
+    return finish_all(plan_study(directory, **options), falling)
 
 
 def seen_anew(study: Study) -> Study:

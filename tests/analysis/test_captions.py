@@ -1,4 +1,4 @@
-"""What is said about budgets, and about few runs."""
+"""What is said about budgets."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from exneat_cli.analysis.captions import budget_sentence, few_runs_sentence, spent_in
+from exneat_cli.analysis.captions import budget_sentence, spent_in
 from tests.analysis.fake_studies import finish, plan_study, run_of
 
 
@@ -51,8 +51,3 @@ def test_what_was_spent_is_that_of_finished_trained_runs(tmp_path: Path) -> None
     finish(run_of(study, "noisy", "exneat", 0), (0.1, 0.2))
     finish(run_of(study, "calm", "random", 0))
     assert spent_in(study, "calm", study.variants).to_numpy().tolist() == [["NEAT", 40, 700], ["NEAT", 50, 800]]
-
-
-def test_fewer_than_ten_runs_in_any_group_are_warned_of() -> None:
-    assert "too narrow below 10 runs" in few_runs_sentence([10, 9])
-    assert few_runs_sentence([10, 11]) == few_runs_sentence([]) == ""

@@ -16,26 +16,15 @@ from msgspec.structs import replace as changed
 from exneat_cli.analysis.catalogue import Panel
 from exneat_cli.analysis.panels import common_curves, draw_panel
 from exneat_cli.analysis.study import Study
-from tests.analysis.fake_studies import LEVELS, SWEEPS, falling, finish_all, plan_study
+from tests.analysis.fake_studies import LEVELS, SWEEPS, a_study
 
 SWEPT = Panel("track", "calm", sweep="sensor_noise")
 KINDS = ("training", "training_runs", "area", "robustness", "cluster")
 
 
-def a_study(directory: Path, **options: object) -> Study:
-    return finish_all(plan_study(directory, **options), falling)  # type: ignore[arg-type]
-
-
 def drawn(study: Study, kind: str, panel: Panel = SWEPT, axis: str = "generation") -> tuple[Axes, dict[str, int]]:
     axes = Figure().add_subplot()
     return axes, draw_panel(kind, axes, panel, study, axis)
-
-
-def test_an_unfinished_run_does_not_count(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=2)
-    finish_all(study, falling)
-    study.runs[0].directory.update_manifest(status="interrupted")
-    assert drawn(study, "training")[1] == {"neat": 1, "exneat": 2}
 
 
 def test_a_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
@@ -100,14 +89,11 @@ def test_the_dashed_line_is_the_mean_of_the_five_runs_best_on_validation_unless_
         np.testing.assert_allclose(line.get_ydata(), fading * (0.3 + 0.013 * np.mean([2, 3, 4, 5, 6])))
 
 
-def test_levels_beyond_the_highest_are_left_out(tmp_path: Path) -> None:
-    axes, _ = drawn(a_study(tmp_path), "robustness", changed(SWEPT, highest=0.3))
-    assert list(axes.get_lines()[0].get_xdata()) == [0.0, 0.1, 0.2, 0.3]
-
-
-def test_full_reward_is_drawn_and_named_where_the_panel_asks_for_it(tmp_path: Path) -> None:
+def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(tmp_path: Path) -> None:
     study = a_study(tmp_path, has_full_reward=True)
-    fitness, full = (drawn(study, "robustness", changed(SWEPT, value=value))[0] for value in ("fitness", "full_reward"))
+    panels = [changed(SWEPT, value=value, highest=0.3) for value in ("fitness", "full_reward")]
+    fitness, full = (drawn(study, "robustness", panel)[0] for panel in panels)
+    assert list(fitness.get_lines()[0].get_xdata()) == [0.0, 0.1, 0.2, 0.3]
     assert (fitness.get_ylabel(), full.get_ylabel()) == ("forward reward", "full reward")
     assert fitness.get_xlabel() == SWEEPS["sensor_noise"]
     one, other = (np.asarray(axes.get_lines()[0].get_ydata()) for axes in (fitness, full))

@@ -71,7 +71,7 @@ def test_robustness_has_a_panel_for_each_sweep_and_none_for_the_unperturbed_row(
     assert "<!-- none -->" not in text
 
 
-def test_a_sweep_without_a_label_is_called_by_its_name(tmp_path: Path) -> None:
+def test_without_labels_sweeps_are_called_by_their_names(tmp_path: Path) -> None:
     assert "<!-- sweep_0 -->" in draw_robustness(a_run(tmp_path / "run"), {}, "fitness")[1].read_text()
 
 

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-import yaml
 
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan, TableRow, read_catalogue
 from exneat_cli.analysis.study import MissingRunsError, Study
-from exneat_cli.analysis.tables import build_comparison, build_table, rounded
+from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.errors import ExneatError
 from tests.analysis.fake_studies import contents, finish, finish_all, plan_study, run_of
 
-EXPERIMENTS = Path(__file__).parents[2] / "experiments"
+CATALOGUE = Path(__file__).parents[2] / "experiments" / "catalogue.yaml"
 SWEPT = {"noisy": Column(of="robustness", sweep="sensor_noise", level=0.3)}
 PLAIN = {"training": Column(of="training"), "test": Column(of="test"), "efficiency": Column(of="efficiency")}
 ROWS = (TableRow("track", "calm", "neat"), TableRow("track", "calm", "exneat"))
@@ -27,8 +26,7 @@ def built(study: Study, directory: Path, columns: Mapping[str, Column], *rows: T
 
 
 def csv_of(table: Built, *index: str) -> pd.DataFrame:
-    table_read = pd.read_csv(table.paths[0], dtype={"mean": str, "published": str, "efficiency": str})
-    return table_read.set_index(list(index)) if index else table_read
+    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str, "efficiency": str}).set_index(list(index))
 
 
 def lines_of(study: Study, directory: Path, columns: Mapping[str, Column], *rows: TableRow) -> pd.DataFrame:
@@ -45,14 +43,14 @@ def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -
         TableRow("track", "calm", "exneat", {"training": 1.0, "efficiency": 7}),
     )
     table = built(study, tmp_path, PLAIN, *rows)
-    by_place = {row[1:3]: row for row in table.rows}
     assert [row[1:3] for row in table.rows] == [(variant, q) for variant in ("NEAT", "ExNEAT") for q in PLAIN]
-    assert by_place["NEAT", "training"][:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
-    assert by_place["NEAT", "training"][6:] == ("0.300", "3", "", "")
-    assert by_place["ExNEAT", "training"][3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
-    assert by_place["ExNEAT", "test"][3:5] == ("", "0.400")
-    assert by_place["NEAT", "efficiency"][3:] == (">20", "2", "", "", "3", "", "")
-    assert by_place["ExNEAT", "efficiency"][3:] == ("7", "1", "", "", "3", "", "")
+    neat, _, neat_efficiency, exneat, exneat_test, exneat_efficiency = table.rows
+    assert neat[:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
+    assert neat[6:] == ("0.300", "3", "", "")
+    assert exneat[3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
+    assert exneat_test[3:5] == ("", "0.400")
+    assert neat_efficiency[3:] == (">20", "2", "", "", "3", "", "")
+    assert exneat_efficiency[3:] == ("7", "1", "", "", "3", "", "")
 
 
 def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_path: Path) -> None:
@@ -64,37 +62,25 @@ def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_p
     assert table.loc[("random actions", "efficiency"), ["mean", "published"]].isna().all()
 
 
-def test_a_variant_that_never_reaches_the_first_one_takes_more_than_all_generations(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=1)
-    finish(run_of(study, "calm", "neat", 0), (0.1, 0.2, 0.9))
-    finish(run_of(study, "calm", "exneat", 0), (0.1, 0.2, 0.8))
-    table = lines_of(study, tmp_path, PLAIN)
-    assert [table.loc[(label, "efficiency"), "mean"] for label in ("NEAT", "ExNEAT")] == ["3", ">3"]
-
-
-def test_efficiency_looks_at_the_mean_of_runs_not_at_single_runs(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=2)
+def test_efficiency_is_when_the_mean_of_runs_reaches_that_of_the_first_variant_if_ever(tmp_path: Path) -> None:
+    study = plan_study(tmp_path, seeds=2, variants={"neat": "NEAT", "exneat": "ExNEAT", "fb": "fb"}, baselines=())
     for seed, curve in enumerate([(0.9, 0.9, 0.9), (0.0, 0.1, 0.2)]):
         finish(run_of(study, "calm", "neat", seed), (0.1, 0.1, 0.5))
         finish(run_of(study, "calm", "exneat", seed), curve)
-    assert lines_of(study, tmp_path, PLAIN).loc[("ExNEAT", "efficiency"), "mean"] == "2"
+        finish(run_of(study, "calm", "fb", seed), (0.1, 0.2, 0.4))
+    table = lines_of(study, tmp_path, PLAIN, *(TableRow("track", "calm", variant) for variant in study.variants))
+    assert [table.loc[(label, "efficiency"), "mean"] for label in study.variants.values()] == ["3", "2", ">3"]
 
 
-def test_csv_keeps_every_digit_where_markdown_rounds(tmp_path: Path) -> None:
+def test_csv_keeps_every_digit_where_markdown_rounds_and_zero_has_no_sign(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=1)
-    for variant in ("neat", "exneat"):
-        finish(run_of(study, "calm", variant, 0), (1 / 3,))
-    exact, readable = (path.read_text() for path in built(study, tmp_path, PLAIN).paths)
-    assert "0.3333333333333333," in exact
-    assert "| 0.333 |" in readable
-
-
-def test_one_decimal_says_enough_of_large_values_and_zero_has_no_sign(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=1)
-    for variant, end in (("neat", 812.3456), ("exneat", -3.2111)):
-        finish(run_of(study, "calm", variant, 0), (end,))
-    assert [row[4] for row in built(study, tmp_path, {"training": Column(of="training")}).rows] == ["812.3", "-3.2"]
-    assert (rounded(-0.0001, 3), rounded(-0.001, 3), rounded(float("nan"), 3)) == ("0.000", "-0.001", "")
+    for variant, end in (("neat", 812.3456), ("exneat", -0.0111)):
+        finish(run_of(study, "calm", variant, 0), (end,), test=end / 1000)
+    table = built(study, tmp_path, PLAIN)
+    assert [row[4] for row in table.rows] == ["812.3", "0.812", "1", "0.0", "0.000", ">1"]
+    exact, readable = (path.read_text() for path in table.paths)
+    assert ",-0.0111," in exact
+    assert "| 0.0 |" in readable
 
 
 def test_robustness_is_that_of_its_sweep_level_and_value(tmp_path: Path) -> None:
@@ -164,24 +150,15 @@ def test_a_bar_in_a_label_does_not_break_the_markdown(tmp_path: Path) -> None:
     assert len({line.replace("\\|", "").count("|") for line in lines if line.startswith("|")}) == 1
 
 
-def study_of(experiment: str, directory: Path) -> Study:
-    content = yaml.safe_load((EXPERIMENTS / f"{experiment}.yaml").read_text(encoding="utf-8"))
-    study = plan_study(
-        directory,
-        variants={name: str(variant["label"]) for name, variant in content["variants"].items()},
-        baselines=[name for name in content["variants"] if name in ("random", "linear_fusion", "motionless")],
-        conditions={name: str(condition["label"]) for name, condition in content["conditions"].items()},
-        experiment=experiment,
-    )
-    return finish_all(study, {(sweep, 0.2): (700.0, 1600.0) for sweep in ("reset_noise", "sensor_noise")})
-
-
 def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(tmp_path: Path) -> None:
-    plans = [each for each in read_catalogue(EXPERIMENTS / "catalogue.yaml").values() if isinstance(each, TablePlan)]
-    studies = {name: study_of(name, tmp_path) for name in {row.experiment for each in plans for row in each.rows}}
+    plans = [each for each in read_catalogue(CATALOGUE).values() if isinstance(each, TablePlan)]
     assert len(plans) == 5
+    levels = {(sweep, 0.2): (700.0, 1600.0) for sweep in ("reset_noise", "sensor_noise")}
     for each in plans:
-        table = build_table(each, studies, tmp_path / "report")
+        names = {row.variant: row.variant for row in each.rows}, {row.condition: row.condition for row in each.rows}
+        directory, experiment = tmp_path / each.name, each.rows[0].experiment
+        planned = plan_study(directory, variants=names[0], baselines=(), conditions=names[1], experiment=experiment)
+        table = build_table(each, {experiment: finish_all(planned, levels)}, tmp_path / "report")
         published = [str(figure) for row in each.rows for figure in row.published.values()]
         assert sorted(row[3] for row in table.rows if row[3]) == sorted(published)
         assert len(table.rows) == len(each.rows) * len(each.columns)
@@ -191,6 +168,7 @@ def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(
 def test_every_variant_is_compared_in_every_condition(tmp_path: Path) -> None:
     table = build_comparison(finish_all(plan_study(tmp_path)), tmp_path / "report")
     assert [path.name for path in table.paths] == ["comparison-track.csv", "comparison-track.md"]
+    assert {len(row) for row in table.rows} == {len(table.header)}
     assert [row[:3] for row in table.rows] == [
         (condition, variant, runs)
         for condition in ("no noise", "much noise")
@@ -206,6 +184,14 @@ def test_every_variant_is_compared_in_every_condition(tmp_path: Path) -> None:
     assert random[["training_mean", "test_low", "test_p_holm", "efficiency"]].isna().all()
 
 
+def test_full_reward_is_compared_where_the_task_has_one_alone(tmp_path: Path) -> None:
+    for has_full_reward in (True, False):
+        study = finish_all(plan_study(tmp_path / str(has_full_reward), has_full_reward=has_full_reward))
+        table = build_comparison(study, tmp_path)
+        assert ("full reward" in table.header) == ("Fitness is forward reward" in table.caption) == has_full_reward
+        assert ("full_reward_mean" in csv_of(table, "condition")) == has_full_reward
+
+
 def test_what_has_not_been_run_is_left_out_or_empty_and_nothing_is_compared_with_it(tmp_path: Path) -> None:
     study = plan_study(tmp_path)
     with pytest.raises(MissingRunsError, match=r"track.*\n  exneat sweep experiment=track"):
@@ -218,24 +204,9 @@ def test_what_has_not_been_run_is_left_out_or_empty_and_nothing_is_compared_with
     assert lines.loc[("much noise", "NEAT"), "runs"] == 0
 
 
-@pytest.mark.parametrize("has_full_reward", [False, True])
-def test_full_reward_is_shown_only_where_the_task_has_one(tmp_path: Path, has_full_reward: bool) -> None:
-    study = finish_all(plan_study(tmp_path, has_full_reward=has_full_reward))
-    table = build_comparison(study, tmp_path / "report")
-    assert ("full reward" in table.header) == ("Fitness is forward reward" in table.caption) == has_full_reward
-    assert ("full_reward_mean" in csv_of(table)) == has_full_reward
-    assert {len(row) for row in table.rows} == {len(table.header)}
-
-
 def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
     for each in ("one", "other"):
         study = finish_all(plan_study(tmp_path / each), {("sensor_noise", 0.3): (0.4, 0.0)})
         built(study, tmp_path / each, {**PLAIN, **SWEPT})
         build_comparison(study, tmp_path / each / "report")
     assert contents(tmp_path / "one" / "report") == contents(tmp_path / "other" / "report")
-
-
-def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
-    (tmp_path / "report").write_text("a file")
-    with pytest.raises(ExneatError, match="report: cannot be made"):
-        built(finish_all(plan_study(tmp_path)), tmp_path, PLAIN)

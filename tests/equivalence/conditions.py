@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 import yaml
+from exneat_cli.commands.composition import configuration_directory
 
 from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, Problem, Results
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.brains.brain import activate, memory_size
-from exneat_cli.commands.composition import configuration_directory
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training

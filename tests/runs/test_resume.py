@@ -114,7 +114,7 @@ def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     assert any(text.startswith("going on after generation 2") for text in said)
 
 
-@pytest.mark.parametrize("name", ["write_hall_of_fame", "write_champion", "write_csv"])
+@pytest.mark.parametrize("name", ["write_hall_of_fame", "write_json", "write_csv"])
 def test_a_run_that_stops_after_training_trains_no_more(tmp_path: Path, name: str) -> None:
     undisturbed = content(train(small(tmp_path / "undisturbed")).directory)
     settings = small(tmp_path / "stopped")

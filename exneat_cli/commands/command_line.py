@@ -1,0 +1,256 @@
+"""The command line of every command: flags, and settings written key=value, which Hydra composes with YAML files.
+
+A value means the same in every command. One that Hydra's grammar cannot read is text as it stands, so that paths may
+hold brackets, quotes and letters of any script; a ``~`` at the beginning of such a text is the home directory, as in
+a shell. What stands in quotes of its own, such as ``"name='3'"``, is text whatever it looks like.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import difflib
+import itertools
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import hydra
+import yaml
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override, Quote, QuotedString
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+import exneat_cli
+from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.errors import ConfigError, ExneatError
+
+PRIMARY = {"train": "config"}
+"""What a command's composition starts from in conf/, where the file is not called like the command."""
+_OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
+"""Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
+_OF_LISTS = ("sweep",)
+"""Groups of which several options may be chosen at once."""
+_FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
+_LONGEST = 300
+
+
+@dataclass(frozen=True)
+class CommandLine:
+    """What was typed after ``exneat``.
+
+    Attributes:
+        words: all of it, and ``exneat`` before, for manifests.
+        primary: the YAML file that the composition starts from, if from any.
+        directories: where YAML files are looked for, in this order.
+        settings: key=value, as Hydra's composition takes them.
+        launcher: the same for Hydra's launcher.
+        multirun: whether settings with several values are to be gone through.
+        shown: ``help`` or ``job`` if that is all that is asked for, else empty.
+    """
+
+    words: tuple[str, ...]
+    primary: str | None
+    directories: tuple[Path, ...]
+    settings: tuple[str, ...]
+    launcher: tuple[str, ...]
+    multirun: bool
+    shown: str
+
+    def compose(self, *keys: str) -> dict[str, Any]:
+        """Compose the settings with the YAML files, as dicts, lists, numbers and strings.
+
+        Args:
+            keys: those that are wanted; without any, all are.
+
+        Raises:
+            ExneatError: they do not fit together, or a value refers to something that is not there.
+        """
+        with self.composed() as config:
+            try:
+                own = OmegaConf.masked_copy(config, list(keys) or [str(key) for key in config if key != "hydra"])
+                plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
+            except OmegaConfBaseException as error:
+                raise ExneatError(in_words(error, self.directories)) from error
+        return {str(key): value for key, value in plain.items()}
+
+    @contextlib.contextmanager
+    def composed(self) -> Iterator[DictConfig]:
+        """Compose the settings as Hydra does, with the section of its own; Hydra is at hand amid the block.
+
+        Raises:
+            ExneatError: they do not fit together.
+        """
+        first, *others = map(str, self.directories)
+        places = ",".join(quoted(f"file://{directory}") for directory in others)
+        overrides = [*self.settings, f"hydra.searchpath=[{places}]"]
+        with contextlib.ExitStack() as ending:
+            try:
+                ending.enter_context(hydra.initialize_config_dir(first, version_base="1.3"))
+                config = hydra.compose(self.primary, overrides=overrides, return_hydra_config=True)
+            except Exception as error:  # Hydra and YAML raise errors of many kinds
+                raise ExneatError(in_words(error, self.directories)) from error
+            yield config
+
+    def combinations(self) -> dict[str, CommandLine]:
+        """Each combination of the settings that have several values, by those values."""
+        choices = []
+        for text in self.settings:
+            override = OverridesParser.create().parse_override(text)
+            values = override.sweep_string_iterator() if override.is_sweep_override() else ()
+            choices.append([f"{override.get_key_element()}={value}" for value in values] or [text])
+        varied = [k for k, texts in enumerate(choices) if len(texts) > 1]
+        return {
+            " ".join(texts[k].lstrip("+") for k in varied): replace(self, settings=texts)
+            for texts in itertools.product(*choices)
+        }
+
+    def show(self) -> str:
+        """What is asked for with ``--cfg job``: the composition as YAML; with ``--help``: the files it comes from."""
+        if self.shown == "job":
+            return yaml.safe_dump(self.compose(), sort_keys=False, allow_unicode=True).rstrip()
+        with self.composed() as config:
+            choices = dict(reversed(config.hydra.runtime.choices.items()))
+        settings = {"config": "\n"} if "task" in choices else {}
+        chosen = {f"{group}/{option}": f"\n# {group}={option}\n" for group, option in choices.items()}
+        parts = []
+        for name, title in {**settings, str(self.primary): "", **chosen}.items():
+            paths = [directory / f"{name}.yaml" for directory in self.directories]
+            text = next((path.read_text(encoding="utf-8") for path in paths if path.exists()), "")
+            parts.append(title + text.removeprefix("# @package _global_\n") if text else "")
+        return "".join(parts).rstrip()
+
+
+def shipped_directory(name: str) -> Path:
+    """A folder of data: the copy inside an installed package, else the one beside it in a checkout."""
+    package = Path(exneat_cli.__file__).parent
+    packaged = package / name
+    return packaged if packaged.is_dir() else package.parent / name
+
+
+def quoted(text: str) -> str:
+    """The text in quotes, so that Hydra's grammar takes it as it stands."""
+    return QuotedString(text=text, quote=Quote.single).with_quotes()
+
+
+def as_written(value: object) -> str:
+    """A value as Hydra's grammar writes it."""
+    if isinstance(value, list):
+        return f"[{','.join(map(as_written, value))}]"
+    return quoted(value) if isinstance(value, str) else json.dumps(value)
+
+
+def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
+    """Read flags and settings, in any order.
+
+    Raises:
+        ExneatError: a flag is unknown or lacks its value, or a setting cannot be read, is not the user's to make, or
+            has several values without ``-m``.
+    """
+    flags, unknown = _flag_parser().parse_known_intermixed_args(list(arguments))
+    if unknown:
+        close = difflib.get_close_matches(unknown[0], _FLAGS, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"settings are written key=value, see exneat {command} --help"
+        raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
+    if flags.multirun and command != "train":
+        raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
+    directories = _search_path(flags.config_path, flags.config_dir)
+    read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
+    return CommandLine(
+        words=("exneat", command, *arguments),
+        primary=flags.config_name or PRIMARY.get(command, command),
+        directories=directories,
+        settings=tuple(text for text in read if not _is_hydras(text)),
+        launcher=tuple(text for text in read if _is_hydras(text)),
+        multirun=flags.multirun,
+        shown="help" if flags.help else flags.cfg or "",
+    )
+
+
+def _flag_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("-h", "--help", action="store_true")
+    parser.add_argument("-m", "--multirun", action="store_true")
+    parser.add_argument("-cd", "--config-dir", action="append", default=[], type=_directory)
+    parser.add_argument("-cp", "--config-path", type=_directory)
+    parser.add_argument("-cn", "--config-name")
+    parser.add_argument("-c", "--cfg", choices=["job"])
+    parser.add_argument("settings", nargs="*")
+
+    def refuse(message: str) -> None:
+        raise ExneatError(message.removeprefix("argument "))
+
+    parser.error = refuse  # type: ignore[method-assign, assignment]
+    return parser
+
+
+def _directory(text: str) -> Path:
+    directory = Path(text).expanduser().absolute()
+    if not directory.is_dir():
+        came = "a file" if directory.exists() else "nothing"
+        raise ExneatError(f"{text}: expected a directory with YAML files, got {came}")
+    return directory
+
+
+def _search_path(start: Path | None, own: Sequence[Path]) -> tuple[Path, ...]:
+    """Where YAML files are looked for, in this order: where the composition starts, exneat's own, and a user's own."""
+    shipped = shipped_directory("conf")
+    for directory in own:
+        for path in directory.rglob("*.yaml"):
+            name = path.relative_to(directory)
+            if (shipped / name).exists():
+                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+    return (*([] if start is None else [start]), shipped, *own)
+
+
+def _is_hydras(text: str) -> bool:
+    return text.lstrip("+").startswith(("hydra.", "hydra/"))
+
+
+def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = False) -> str:
+    """Return the setting as Hydra's composition takes it; an unknown key passes, for dataclasses know the nearest one.
+
+    Raises:
+        ExneatError: it cannot be read, is not the user's to make, or has several values unless in a multirun.
+    """
+    readable, override = _parsed(text)
+    key = override.key_or_group
+    if not key:
+        raise ExneatError(f"{text}: expected key=value, got no key")
+    if override.is_delete():
+        raise ExneatError(f"{text}: a setting cannot be deleted; leave it out, or give it the value you want")
+    if override.is_sweep_override() and not (multirun and override.is_discrete_sweep() and not _is_hydras(key)):
+        raise ExneatError(
+            f"{text}: expected one value, got several\n"
+            f"  exneat train -m goes through them (--multirun); a list is written {key}=[...], text in quotes"
+        )
+    section, _, name = key.replace("/", ".").partition(".")
+    if section == "hydra":
+        if not name.startswith(_OF_LAUNCHERS):
+            fix = "hydra/launcher=, hydra.launcher.* and hydra.sweep.dir= are yours to set, output= says where runs go"
+            raise ExneatError(f"{text}: exneat sets hydra.{name} itself\n  {fix}")
+        return readable
+    if not any((directory / key).is_dir() for directory in directories):
+        return f"++{readable.lstrip('+')}"
+    if not override.is_sweep_override():
+        value = override.value()
+        if isinstance(value, list) and key not in _OF_LISTS:
+            raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
+        if not isinstance(value, str | list):
+            raise ConfigError(key, "the name of an option", value)
+    return readable
+
+
+def _parsed(text: str) -> tuple[str, Override]:
+    """A setting that Hydra's grammar reads, and what it reads."""
+    parser = OverridesParser.create()
+    key, separator, value = text.partition("=")
+    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else ():
+        with contextlib.suppress(HydraException):
+            return readable, parser.parse_override(readable)
+    raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")

@@ -1,0 +1,95 @@
+"""Doing several jobs: here, one after the other, or side by side and on other machines by a launcher of Hydra's."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hydra._internal.callbacks import Callbacks
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.plugins import Plugins
+from hydra.types import HydraContext
+from omegaconf import OmegaConf
+
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.commands.jobs import Job
+from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import as_worker, launching, signal_heard
+from exneat_cli.rollouts import keep_clusters
+
+_WRITING_NOTHING = (
+    *("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null"),
+    *("hydra.sweep.dir=.", "hydra.sweep.subdir=."),
+)
+"""Hydra would otherwise make directories, write files of its own there and open a log."""
+
+
+def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine) -> list[str]:
+    """Do `work` for each job; return why each failed, empty where it did not.
+
+    Args:
+        work: what is done; picklable if the command line names a launcher.
+        jobs: what it is done for.
+        line: names the launcher.
+
+    Raises:
+        ExneatError: there is no such launcher, or it gave up; some jobs may be done by then.
+    """
+    if not line.launcher:
+        with keep_clusters():  # starting one takes seconds
+            return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
+    with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
+        return _launch(functools.partial(_do, work, jobs, Path(workplace)), len(jobs), line, Path(workplace))
+
+
+def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
+    """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
+    with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
+        _refuse_calls(OmegaConf.to_container(config.hydra), "hydra")
+        context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())
+        try:
+            launcher = Plugins.instance().instantiate_launcher(context, task, config)
+            with launching(workplace):
+                done = launcher.launch([[f"+job={k}"] for k in range(count)], initial_job_idx=0)
+            return [str(each.return_value) for each in done]
+        except Exception as error:  # launchers and their libraries raise errors of many kinds
+            if signal_heard() is not None:
+                raise
+            raise ExneatError(in_words(error, line.directories)) from error
+
+
+def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None, config: Mapping[str, int]) -> str:
+    """Do one job, here or in a worker; return why it failed, for an error may not survive the way back."""
+    job = jobs[config["job"]]
+    try:
+        with contextlib.nullcontext() if workplace is None else as_worker(workplace):
+            work(job)
+    except Exception as error:
+        if signal_heard() is not None:
+            raise KeyboardInterrupt from error
+        if isinstance(error, ExneatError):
+            reason = str(error)
+        else:
+            traceback.print_exc()
+            reason = f"{type(error).__name__}: {error}"
+    else:
+        return ""
+    print(f"exneat: {job.name}: {reason}", file=sys.stderr, flush=True)
+    return reason
+
+
+def _refuse_calls(node: Any, key: str) -> None:
+    """Refuse settings of Hydra's that would call something; its launchers are plug-ins, which it checks itself."""
+    children = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for name, child in children:
+        if name in ("_target_", "()") and key not in ("hydra.launcher", "hydra.sweeper"):
+            raise ExneatError(f"{key}.{name}: would call {child}; a configuration may not call code")
+        _refuse_calls(child, f"{key}.{name}")
