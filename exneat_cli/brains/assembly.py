@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from exneat_cli.algorithms import ArrayGenome
-from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, end_to_end
-from exneat_cli.algorithms.neat.structure import mark_sources, node_row, row_of
+from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, end_to_end, mark_sources, node_row, row_of
 from exneat_cli.brains.brain import Brains
 from exneat_cli.brains.wiring_arrays import wiring_arrays
 from exneat_cli.compiling import compiled

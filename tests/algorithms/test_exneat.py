@@ -12,9 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exneat_cli.algorithms import NEAT, Coevolution, EvolutionSettings, ExNEAT, from_stock, neat_config, to_stock
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, from_stock, neat_config, to_stock
 from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties
-from exneat_cli.errors import ConfigError
 from exneat_cli.seeding import stream
 from tests.algorithms.problems import contents, problem_of, synthetic, tell
 
@@ -155,9 +154,3 @@ def test_one_seed_repeats_another_differs_and_pythons_random_state_stays(genome:
     assert run(0) == run(0)
     assert run(0) != run(1)
     assert random.getstate() == before
-
-
-@pytest.mark.parametrize("algorithm", [ExNEAT, NEAT])
-def test_an_algorithm_keeps_its_name(algorithm: type[ExNEAT]) -> None:
-    with pytest.raises(ConfigError, match=r"algorithm\.name: expected"):
-        algorithm(name="cma_es")

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 import yaml
-from exneat_cli.commands.composition import configuration_directory
 
 from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, Problem, Results
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.brains.brain import activate, memory_size
+from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
@@ -59,7 +59,7 @@ def _xor_fitness(brains: Brains, b: int) -> float:
 
 def grid_world(task: str, sensor_std: float, genome: str, seed: int) -> float:
     """Best fitness so far after NEAT's paper budget in a grid world, sensor noise N(0, `sensor_std`)."""
-    path = configuration_directory() / "task" / f"{task}.yaml"
+    path = shipped_directory("conf") / "task" / f"{task}.yaml"
     paper = yaml.safe_load(path.read_text(encoding="utf-8"))["budgets"]["paper"]
     settings = RunSettings(
         task=TASKS[task](),

@@ -14,9 +14,17 @@ from neat.genome import DefaultGenomeConfig
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms.neat.genes import ACTIVATIONS, CONNECTION, NODE, Connections, Genes, end_to_end
+from exneat_cli.algorithms.neat.genes import (
+    ACTIVATIONS,
+    CONNECTION,
+    NODE,
+    Connections,
+    Genes,
+    end_to_end,
+    row_of,
+    would_close_a_cycle,
+)
 from exneat_cli.algorithms.neat.operators import Number, cross, draw, genetic_distance, mutate_attributes
-from exneat_cli.algorithms.neat.structure import row_of, would_close_a_cycle
 
 _ITEMS = ("init_mean", "init_stdev", "mutate_rate", "replace_rate", "mutate_power", "min_value", "max_value")
 _NUMBERS = {name: attrgetter(*(f"{name}_{item}" for item in _ITEMS)) for name in ("weight", "bias", "response")}

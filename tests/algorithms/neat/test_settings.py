@@ -6,15 +6,15 @@ import dataclasses
 
 import pytest
 import yaml
-from exneat_cli.commands.composition import configuration_directory
 
 from exneat_cli.algorithms import RECURRENT, EvolutionSettings
+from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.errors import ConfigError
 
 
 @pytest.mark.parametrize(("name", "settings"), [("feed_forward", EvolutionSettings()), ("recurrent", RECURRENT)])
 def test_a_file_in_conf_spells_every_setting_as_the_dataclass_has_it(name: str, settings: EvolutionSettings) -> None:
-    path = configuration_directory() / "evolution" / f"{name}.yaml"
+    path = shipped_directory("conf") / "evolution" / f"{name}.yaml"
     assert yaml.safe_load(path.read_text(encoding="utf-8")) == dataclasses.asdict(settings)
 
 

@@ -10,8 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neat.graphs import creates_cycle, required_for_output
 
-from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, Connections, Nodes
-from exneat_cli.algorithms.neat.structure import mark_sources, node_row, row_of, would_close_a_cycle
+from exneat_cli.algorithms.neat.genes import (
+    CONNECTION,
+    NODE,
+    Connections,
+    Nodes,
+    mark_sources,
+    node_row,
+    row_of,
+    would_close_a_cycle,
+)
 
 
 @st.composite
