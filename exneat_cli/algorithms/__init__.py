@@ -6,7 +6,7 @@ from exneat_cli.algorithms.exneat import NEAT, PAIRINGS, Coevolution, ExNEAT
 from exneat_cli.algorithms.neat.conversion import from_stock, to_stock
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.neat_python import initial_genomes, neat_config
+from exneat_cli.algorithms.neat.neat_python import neat_config
 from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings
 from exneat_cli.algorithms.teams import pack_teams, unpack_teams
 
