@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, Brains, RandomActions
 from exneat_cli.compiling import compiled
-from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import evolve
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import AntTask, Simulation
 from exneat_cli.tasks.robots.dynamics import AntWorld, rewind
@@ -163,16 +162,12 @@ def compare_with_physics(variant: str) -> Row:
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
         BarePhysics(settings, threads) as physics,
     ):
-        began = time.perf_counter()
-
-        def after_ours(history: Sequence[HistoryRow]) -> None:
-            nonlocal began
-            walls.append(time.perf_counter() - began)
+        training = Training.start(settings)
+        while not training.is_over:
+            walls.append(seconds_of(partial(training.advance, runner)))
             episodes.append(runner.seconds)
             ratios.append(walls[-1] / physics.seconds(runner))
-            began = time.perf_counter()
-
-        history = evolve(settings, runner, after_ours).history
+    history = training.history
     steps = history[-1]["env_steps"] - history[0]["env_steps"]
     note = (
         f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
