@@ -116,10 +116,10 @@ class CommandLine:
             return yaml.safe_dump(self.compose(), sort_keys=False, allow_unicode=True).rstrip()
         with self.composed() as config:
             choices = dict(reversed(config.hydra.runtime.choices.items()))
-        settings = {"config": "\n"} if "task" in choices else {}
-        chosen = {f"{group}/{option}": f"\n# {group}={option}\n" for group, option in choices.items()}
+        files = {str(self.primary): ""} | ({"config": "\n"} if "task" in choices and self.primary != "config" else {})
+        files |= {f"{group}/{option}": f"\n# {group}={option}\n" for group, option in choices.items()}
         parts = []
-        for name, title in {**settings, str(self.primary): "", **chosen}.items():
+        for name, title in files.items():
             paths = [directory / f"{name}.yaml" for directory in self.directories]
             text = next((path.read_text(encoding="utf-8") for path in paths if path.exists()), "")
             parts.append(title + text.removeprefix("# @package _global_\n") if text else "")

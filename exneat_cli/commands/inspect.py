@@ -66,7 +66,9 @@ def _links(champion: Champion, module: Module) -> Iterable[str]:
     groups: dict[tuple[int, str, bool], list[int]] = {}
     for pin in module.pins:
         if not pin.is_sensor:
-            groups.setdefault((pin.module, champion.plan.kind_of(pin), pin.delayed), []).append(pin.index)
+            kind = champion.plan.kind_of(pin)
+            first = champion.plan.modules[pin.module].outputs if kind == "hidden" else 0
+            groups.setdefault((pin.module, kind, pin.delayed), []).append(pin.index - first)
     for (source, kind, delayed), indices in groups.items():
         when = "of the previous step" if delayed else "of this step"
         yield f"{kind} {_ranges(indices)} of {champion.plan.modules[source].name}, {when}"
