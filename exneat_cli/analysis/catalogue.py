@@ -9,8 +9,8 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
-from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.records import read_yaml
+from exneat_cli.errors import ExneatError, check_choice, check_section
+from exneat_cli.records import converted, read_yaml
 
 FIGURE_KINDS = ("training", "training_runs", "robustness", "cluster", "area", "network")
 QUANTITIES = ("training", "test", "full_reward", "efficiency", "robustness")
@@ -129,23 +129,20 @@ def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:
     plans: dict[str, FigurePlan | TablePlan] = {}
     for name, entry in read_yaml(path).items():
         try:
-            if not isinstance(entry, dict):
-                raise ExneatError(f"expected keys with values, got {entry!r}")
-            check_choice("kind", entry.get("kind"), (*FIGURE_KINDS, "table"))
-            named = {**entry, "name": str(name)}
-            schema: type[FigurePlan | TablePlan] = TablePlan if entry["kind"] == "table" else FigurePlan
-            plans[str(name)] = msgspec.convert(named, schema)
-        except (msgspec.ValidationError, ExneatError) as error:
-            raise ExneatError(f"{path}: {name}: {_reason(str(error))}") from error
+            kind = check_section("entry", entry).get("kind")
+            check_choice("kind", kind, (*FIGURE_KINDS, "table"))
+            schema: type[FigurePlan | TablePlan] = TablePlan if kind == "table" else FigurePlan
+            plans[str(name)] = converted({**entry, "name": str(name)}, schema, "")
+        except ExneatError as error:
+            raise ExneatError(f"{path}: {name}: {error}{_nearest(str(error))}") from error
     return plans
 
 
-def _reason(message: str) -> str:
-    """What msgspec found; for an unknown key also the nearest valid one."""
-    unknown = re.search(r"unknown field `([^`]*)`(?: - at `\$\.(\w+))?", message)
+def _nearest(message: str) -> str:
+    """Of a message about an unknown key: what was probably meant."""
+    unknown = re.search(r"(?:(\w+)\[.*\]: )?object contains unknown field (.*)", message)
     if not unknown:
-        return message
-    part = {"panels": Panel, "columns": Column, "rows": TableRow}.get(unknown[2])
+        return ""
+    part = {"panels": Panel, "columns": Column, "rows": TableRow}.get(unknown[1])
     known = part.__struct_fields__ if part else {*FigurePlan.__struct_fields__, *TablePlan.__struct_fields__}
-    nearest = difflib.get_close_matches(unknown[1], sorted(known), n=1, cutoff=0.0)
-    return f"{message}; the nearest valid one is {nearest[0]}"
+    return f"; the nearest valid one is {difflib.get_close_matches(unknown[2], sorted(known), n=1, cutoff=0.0)[0]}"

@@ -142,12 +142,8 @@ class Study:
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-
-        def validation(run: PlannedRun) -> float:
-            result = self.manifests[run].result
-            return -math.inf if result is None or result.validation is None else result.validation
-
-        return sorted(self.of(condition, variant), key=validation, reverse=True)
+        validation = dict(zip(self.manifests, self.results["validation"].fillna(-math.inf), strict=True))
+        return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""

@@ -250,7 +250,7 @@ def _parsed(text: str) -> tuple[str, Override]:
     """A setting that Hydra's grammar reads, and what it reads."""
     parser = OverridesParser.create()
     key, separator, value = text.partition("=")
-    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else ():
+    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else (text,):
         with contextlib.suppress(HydraException):
             return readable, parser.parse_override(readable)
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")

@@ -124,7 +124,7 @@ def _experiment(name: str, content: Any) -> Experiment:
         check_whole(f"runs.{budget}", runs, 1, 10_000)
     return replace(
         experiment,
-        settings=_flat("settings", experiment.settings),
+        settings=_settings("settings", experiment.settings),
         variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
@@ -136,7 +136,7 @@ def _variant(key: str, entry: Any) -> Variant:
     check_flag(f"{key}.swept", variant.swept)
     if variant.runs is not None:
         check_whole(f"{key}.runs", variant.runs, 1, 10_000)
-    return replace(variant, settings=_flat(f"{key}.settings", variant.settings))
+    return replace(variant, settings=_settings(f"{key}.settings", variant.settings))
 
 
 def _condition(key: str, entry: Any) -> Condition:
@@ -144,18 +144,24 @@ def _condition(key: str, entry: Any) -> Condition:
     check_text(f"{key}.label", condition.label)
     if not isinstance(condition.sweeps, list) or not all(isinstance(sweep, str) for sweep in condition.sweeps):
         raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", condition.sweeps)
-    return replace(condition, settings=_flat(f"{key}.settings", condition.settings))
+    return replace(condition, settings=_settings(f"{key}.settings", condition.settings))
 
 
-def _flat(key: str, values: Any) -> dict[str, Any]:
+def _settings(key: str, values: Any) -> dict[str, Any]:
     """Settings by dotted name; sections within sections are spelled out."""
-    flat: dict[str, Any] = {}
-    for name, value in check_section(key, values).items():
-        if re.split("[./]", str(name).lstrip("+~"))[0] in _SET_HERE:
+    flat = dict(_flat(check_section(key, values)))
+    for name, value in flat.items():
+        if re.split("[./]", name.lstrip("+~"))[0] in _SET_HERE:
             raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
-        inner = _flat(f"{key}.{name}", value) if isinstance(value, Mapping) else {"": value}
-        flat.update({f"{name}.{rest}".rstrip("."): each for rest, each in inner.items()})
     return flat
+
+
+def _flat(values: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from ((f"{name}.{inner}", each) for inner, each in _flat(value))
+        else:
+            yield str(name), value
 
 
 def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:

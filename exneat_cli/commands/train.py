@@ -10,7 +10,7 @@ from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import Job, read_job
 from exneat_cli.commands.launching import run_jobs
 from exneat_cli.errors import ExneatError
-from exneat_cli.runs import progress_for_terminal
+from exneat_cli.runs import Finished, progress_for_terminal
 
 
 def run(line: CommandLine) -> int:
@@ -20,7 +20,8 @@ def run(line: CommandLine) -> int:
         ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
     if not line.multirun and not line.launcher:
-        _train(line.words, read_job("train", line.compose()), go_on=False)
+        job = read_job("train", line.compose())
+        _tell(job.do(progress_for_terminal(), line.words, go_on=False))
         return 0
     jobs, failures = [], []
     for name, each in line.combinations().items():
@@ -38,7 +39,10 @@ def run(line: CommandLine) -> int:
 
 
 def _train(command: Sequence[str], job: Job, *, go_on: bool) -> None:
-    finished = job.do(progress_for_terminal(), command, go_on=go_on)
+    _tell(job.do(progress_for_terminal(), command, go_on=go_on))
+
+
+def _tell(finished: Finished) -> None:
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")

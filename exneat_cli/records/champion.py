@@ -1,4 +1,4 @@
-"""champion.json and hall_of_fame.jsonl: teams as data, readable without exneat; what they hold is in the README.
+"""champion.json and hall_of_fame.jsonl: teams as data, readable without exneat; what they hold is in docs/champion.md.
 
 A champion may come from a stranger: nothing in it is run, and compiled code may trust what `read_champion` returns.
 """

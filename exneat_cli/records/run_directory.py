@@ -59,7 +59,7 @@ def _shortest(text: str) -> int | float:
 
 @dataclass(unsafe_hash=True)
 class RunDirectory:
-    """Where one run keeps its files; see the README for what each of them holds.
+    """Where one run keeps its files; docs/run-directory.md says what each of them holds.
 
     Attributes:
         path: of the directory, ``<output>/<name>/<variant>-s<seed>-<hash>``.

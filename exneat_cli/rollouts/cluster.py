@@ -26,11 +26,10 @@ from typing import Any
 import exneat_cli
 from exneat_cli.compiling import source_digest
 from exneat_cli.errors import ExneatError
-from exneat_cli.rollouts.executor import Executor
+from exneat_cli.rollouts.episode import Acting, World
 from exneat_cli.rollouts.outcomes import Tally
-from exneat_cli.rollouts.perturbation import Noise
+from exneat_cli.rollouts.settings import Executor, Noise
 from exneat_cli.rollouts.sharing import blocks
-from exneat_cli.rollouts.world import Acting, World
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
 
@@ -40,10 +39,6 @@ PATIENCE_SECONDS = 60.0
 """How long a cluster may be without any worker."""
 CONNECT_SECONDS = 8
 """How long to wait for the scheduler at an address."""
-STOP_SECONDS = 1
-"""How long a worker of our own may take to stop by itself: it has nothing to save."""
-WORLDS_KEPT = 4
-"""A worker keeps the opened worlds of this many tasks; a robustness sweep has one per level."""
 
 _open: dict[Executor, _Cluster] = {}
 _users = 0
@@ -72,7 +67,7 @@ def cluster_of(executor: Executor) -> _Cluster:
         ExneatError: dask is not installed, or nothing answers at the executor's address.
     """
     with _lock:
-        if executor in _open and not _open[executor].usable:
+        if executor in _open and _open[executor].client.status != "running":
             _open.pop(executor).close()
         if executor not in _open:
             _open[executor] = _Cluster(executor)
@@ -80,7 +75,7 @@ def cluster_of(executor: Executor) -> _Cluster:
 
 
 class _Cluster:
-    """A connection to a scheduler, and the workers that were started for it, if there is no address.
+    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files.
 
     Args:
         executor: of name ``dask``.
@@ -109,16 +104,7 @@ class _Cluster:
                 fix = "start one with: dask scheduler; the address is in its first lines"
                 raise ExneatError(f"{what}\n  {fix}") from error
             ending.callback(self.client.close)
-            self._ending = ending.pop_all()
-
-    @property
-    def usable(self) -> bool:
-        """Whether the scheduler is still there."""
-        return bool(self.client.status == "running")
-
-    def close(self) -> None:
-        """Leave the cluster; workers that were started for it are ended, with their files."""
-        self._ending.close()
+            self.close = ending.pop_all().close
 
     def run(
         self, setup: tuple[Task, Noise, bool], acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally
@@ -150,7 +136,7 @@ class _Cluster:
         except KilledWorker as error:
             raise ExneatError("executor=dask: gave up: one worker after the other died over the same brains") from error
         finally:
-            if self.usable:
+            if self.client.status == "running":
                 pool.shutdown(wait=False)  # what waits is not begun; what is being run ends by itself
 
     def _gather(self, waiting: dict[Future[tuple[Tally, float]], tuple[slice, slice]], tally: Tally) -> None:
@@ -158,7 +144,7 @@ class _Cluster:
         pace, workers_seen = math.inf, time.monotonic()
         while waiting:
             done, _ = wait(waiting, timeout=1.0, return_when=FIRST_COMPLETED)
-            if not self.usable or any(future.cancelled() for future in done):
+            if self.client.status != "running" or any(future.cancelled() for future in done):
                 raise ExneatError(f"executor=dask: {self._name} went away")
             for future in done:
                 place = waiting.pop(future)
@@ -178,8 +164,8 @@ class _Cluster:
     def _threads(self) -> int:
         """How many threads all workers have together, now; 0 also if the scheduler cannot be asked."""
         try:
-            return sum(self.client.nthreads().values()) if self.usable else 0
-        except (OSError, asyncio.CancelledError):
+            return sum(self.client.nthreads().values())
+        except (OSError, AttributeError, asyncio.CancelledError):  # it went away just now
             return 0
 
     def _started(self, ending: contextlib.ExitStack) -> Any:
@@ -195,7 +181,7 @@ class _Cluster:
             host="127.0.0.1",
             dashboard_address=None,
             # The scheduler listens there without a dashboard too.
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0", "local_directory": scratch},
             memory_limit=0,
             local_directory=scratch,
             silence_logs=logging.CRITICAL,
@@ -215,8 +201,8 @@ async def _ignore_interrupts() -> None:
 
 
 async def _stop_workers(cluster: Any) -> None:
-    """End the workers, also those in the midst of episodes, for which dask alone would wait longer."""
-    stopping = [nanny.close(timeout=STOP_SECONDS) for nanny in cluster.workers.values()]
+    """End the workers; those in the midst of episodes after a second, since they have nothing to save."""
+    stopping = [nanny.close(timeout=1.0) for nanny in cluster.workers.values()]
     await asyncio.gather(*stopping, return_exceptions=True)
 
 
@@ -248,7 +234,7 @@ def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tall
     return tally, time.perf_counter() - began
 
 
-@functools.lru_cache(WORLDS_KEPT)
+@functools.lru_cache(4)  # a robustness sweep has another one at every level
 def _idle_worlds(world: bytes) -> list[World]:
     """Opened worlds of this worker that nobody uses; take from and give back to it."""
     return []

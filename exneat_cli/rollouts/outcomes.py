@@ -74,10 +74,9 @@ class Tally(NamedTuple):
             fitness = task.fitness_of(self.totals).T
             full_reward = task.full_reward_of(self.totals).T if isinstance(task, HasFullReward) else fitness
         failed = (self.status.T == FAILED) | ~np.isfinite(fitness) | ~np.isfinite(full_reward)
-        floor = task.failure_floor
         return Outcomes(
-            fitness=np.where(failed, floor, fitness),
-            full_reward=np.where(failed, floor, full_reward),
+            fitness=np.where(failed, task.failure_floor, fitness),
+            full_reward=np.where(failed, task.failure_floor, full_reward),
             steps=self.steps.T,
             failed=failed,
             moments=self._moments(~failed.T) if self.means.shape[-1] else None,
@@ -85,10 +84,9 @@ class Tally(NamedTuple):
 
     def _moments(self, sound: NDArray[np.bool_]) -> Moments:
         """(B, sensed) over the `sound`, (E, B), episodes, merged in their order."""
-        shape = self.means.shape[1:]
         # What is not finite would stay so in the statistics of a whole training.
         sound = (sound & np.isfinite(self.squares).all(axis=-1))[..., np.newaxis]
         each = (np.where(sound, values, 0.0) for values in (self.steps[..., np.newaxis], self.means, self.squares))
         counts, means, squares = (np.broadcast_to(v, self.means.shape).reshape(len(sound), -1) for v in each)
         together = merged(map(Moments, counts, means, squares), means.shape[1])
-        return Moments(*(values.reshape(shape) for values in together))
+        return Moments(*(values.reshape(self.means.shape[1:]) for values in together))

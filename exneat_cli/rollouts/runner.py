@@ -7,6 +7,7 @@ the number of workers nor on which of them ran what.
 from __future__ import annotations
 
 import contextlib
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 
@@ -15,13 +16,14 @@ import numpy as np
 from exneat_cli.brains import Brain, Brains, RandomActions, motionless
 from exneat_cli.brains.brain import lay_out
 from exneat_cli.rollouts.cluster import cluster_of, keep_clusters
-from exneat_cli.rollouts.executor import Executor
+from exneat_cli.rollouts.episode import Acting, World
 from exneat_cli.rollouts.outcomes import Outcomes, Tally, Trace
-from exneat_cli.rollouts.perturbation import Noise
+from exneat_cli.rollouts.settings import Executor, Noise
 from exneat_cli.rollouts.sharing import shares_for_threads, short_shares
-from exneat_cli.rollouts.world import Acting, World
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
+
+Actors = Brains | Sequence[Brain] | RandomActions
 
 
 class Runner:
@@ -44,7 +46,8 @@ class Runner:
         self._worlds = [World(task, noise, training=training, halt=self._halt) for _ in range(threads)]
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="episodes")  # starts none before it has work
         with contextlib.ExitStack() as ending:
-            ending.callback(self._end_threads)
+            ending.callback(self._pool.shutdown, cancel_futures=True)
+            ending.callback(self._halt.fill, True)  # threads end before the next step of their episodes
             if executor.name == "dask":
                 ending.enter_context(keep_clusters())
                 cluster_of(executor)
@@ -56,13 +59,7 @@ class Runner:
     def __exit__(self, *exception: object) -> None:
         self._ending.close()
 
-    def run(
-        self,
-        brains: Brains | Sequence[Brain] | RandomActions,
-        episodes: Sequence[EpisodeSeeds],
-        *,
-        moments: bool = False,
-    ) -> Outcomes:
+    def run(self, brains: Actors, episodes: Sequence[EpisodeSeeds], *, moments: bool = False) -> Outcomes:
         """Outcomes of every brain (one, if it acts at random) in every episode.
 
         Args:
@@ -102,21 +99,13 @@ class Runner:
             try:
                 world.run(shares, acting, episodes, tally)
             except BaseException:
-                for _ in shares:  # nothing is left for the other threads
-                    pass
+                deque(shares, maxlen=0)  # nothing is left for the other threads
                 raise
 
-        workers = [self._pool.submit(work, world) for world in self._worlds]
-        wait(workers)
-        for worker in workers:
+        for worker in wait([self._pool.submit(work, world) for world in self._worlds]).done:
             worker.result()
 
-    def _end_threads(self) -> None:
-        """End all threads, before the next step of their episodes."""
-        self._halt[0] = True
-        self._pool.shutdown(cancel_futures=True)
-
-    def _acting(self, brains: Brains | Sequence[Brain] | RandomActions) -> Acting:
+    def _acting(self, brains: Actors) -> Acting:
         """Brains end to end; refuses those that compiled code would let read and write elsewhere."""
         task = self._task
         actions = len(task.actuator_names)

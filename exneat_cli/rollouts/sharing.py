@@ -43,8 +43,8 @@ def short_shares(brains: int, episodes: int) -> Iterator[Share]:
             seconds = time.perf_counter() - began
             if seconds > LONGEST_CALL:
                 size = max(1, size // 2)
-            elif seconds < LONGEST_CALL / 2 and last - first == size:
-                size *= 2
+            elif seconds < LONGEST_CALL / 8:
+                size *= 4
             first = last
 
 

@@ -10,15 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brain, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.records import (
-    DONE,
-    RunDirectory,
-    Score,
-    merge_robustness,
-    read_champion,
-    read_robustness,
-    read_yaml,
-)
+from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes

@@ -55,11 +55,7 @@ class Finished:
 
 @keep_clusters()
 def train(
-    settings: RunSettings,
-    *,
-    progress: Progress | None = None,
-    command: Sequence[str] = (),
-    go_on: bool = False,
+    settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
     """Do one run, or find it done.
 

@@ -38,22 +38,3 @@ for _name, _task in TASKS.items():
             entry_point="exneat_cli.tasks.grid.environment:GridEnvironment",
             kwargs={"task": _name},
         )
-
-__all__ = [
-    "ENDED",
-    "FAILED",
-    "RUNNING",
-    "TASKS",
-    "AntTask",
-    "Foraging",
-    "GeneralMaze",
-    "GridTask",
-    "HasFullReward",
-    "HasInitialPose",
-    "HasTiles",
-    "Hunting",
-    "Part",
-    "Simulation",
-    "Task",
-    "TrackMaze",
-]

@@ -22,10 +22,7 @@ def hall_of(offers: Iterable[tuple[int, float]]) -> list[Candidate]:
 
 @pytest.mark.parametrize(
     ("offered", "kept"),
-    [
-        ([50.0, 100.0, 91.0, 90.0, 89.9], [100.0, 91.0, 90.0]),
-        ([-10.0, -10.9, -11.1], [-10.0, -10.9]),
-    ],
+    [([50.0, 100.0, 91.0, 90.0, 89.9], [100.0, 91.0, 90.0]), ([-10.0, -10.9, -11.1], [-10.0, -10.9])],
 )
 def test_only_teams_within_a_tenth_of_the_best_stay(offered: list[float], kept: list[float]) -> None:
     assert [entry.fitness for entry in hall_of(enumerate(offered))] == kept

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,7 @@ def finish(
 
 
 def finish_all(study: Study, levels: Levels | Callable[[float], Levels] | None = None) -> Study:
-    """Finish every run: later variants and seeds do better; returns a study that sees them.
+    """Finish every run: later variants and seeds do better; returns the study as it then is.
 
     `levels` may depend on how good a run is in the end.
     """
@@ -120,7 +121,7 @@ def finish_all(study: Study, levels: Levels | Callable[[float], Levels] | None =
         curve = () if run.variant in study.baselines else tuple(end * share for share in (0.4, 0.7, 0.9, 1.0))
         own = levels(end) if callable(levels) else levels
         finish(run, curve, test=end - 0.05, full_reward=end + 1.0, validation=end, levels=own)
-    return seen_anew(study)
+    return replace(study)
 
 
 def falling(height: float) -> Levels:
@@ -132,11 +133,6 @@ def falling(height: float) -> Levels:
 def a_study(directory: Path, **options: Any) -> Study:
     """All runs finished, with all levels."""
     return finish_all(plan_study(directory, **options), falling)
-
-
-def seen_anew(study: Study) -> Study:
-    """The same study without what it remembers of its runs."""
-    return Study(**{name: getattr(study, name) for name in Study.__dataclass_fields__})
 
 
 def run_of(study: Study, condition: str, variant: str, seed: int) -> PlannedRun:

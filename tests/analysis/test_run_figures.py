@@ -7,14 +7,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
-from exneat_cli.records import (
-    UNPERTURBED,
-    RobustnessRow,
-    RunDirectory,
-    merge_robustness,
-    write_csv,
-    write_history,
-)
+from exneat_cli.records import UNPERTURBED, RobustnessRow, RunDirectory, merge_robustness, write_csv, write_history
 from tests.analysis.fake_studies import contents, has_white_edges, history_row
 
 

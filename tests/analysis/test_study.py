@@ -10,7 +10,7 @@ import pytest
 
 from exneat_cli.analysis.study import read_csv
 from exneat_cli.errors import ExneatError
-from tests.analysis.fake_studies import falling, finish, finish_all, plan_study, run_of, seen_anew
+from tests.analysis.fake_studies import falling, finish, finish_all, plan_study, run_of
 
 
 def test_runs_that_are_not_done_or_were_trained_for_longer_do_not_count(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_rows_of_other_levels_and_numbers_of_episodes_are_left_out(tmp_path: Pat
     assert set(rows["parameter"]) == {"gap"}
     assert sorted(set(rows["level"])) == [0.1, 0.3]
     assert replace(planned, sweep_episodes=100).robustness("calm").empty
-    assert len(seen_anew(study).robustness("calm")) == 3 * 2 * 6
+    assert len(study.robustness("calm")) == 3 * 2 * 6
 
 
 @pytest.mark.parametrize(

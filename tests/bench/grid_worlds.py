@@ -14,12 +14,12 @@ import yaml
 from exneat_cli.algorithms import RECURRENT, ArrayGenome, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
-from exneat_cli.commands.composition import configuration_directory
+from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
 from exneat_cli.tasks import TASKS, GeneralMaze, Hunting, Task
-from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
+from exneat_cli.wiring import Plan, plan_body
 from tests.bench.measurement import RATIO, SECONDS, Bar, Pace, Row, VerificationError, pace_ratios, seconds_of
 from tests.bench.plain_python_worlds import PlainHunting, PlainMaze, PlainOutcome, PlainWorld, run_episode
 
@@ -97,7 +97,7 @@ def compare_hunting(repetitions: int) -> Row:
 
 
 def _compare(task: Task, world: PlainWorld, repetitions: int) -> Row:
-    plan = plan_wiring(task, "neat", Geometry(), "none", Wiring(), hidden=RECURRENT.neat_hidden)
+    plan = plan_body(task, hidden=RECURRENT.neat_hidden)
     (shape,) = plan.subpopulation_shapes
     config = neat_config(RECURRENT, GENOMES, shape)
     genomes = list(Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values())
@@ -185,7 +185,7 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
 
 
 def _settings(task: str, algorithm: str, budget: str, output: str) -> RunSettings:
-    path = configuration_directory() / "task" / f"{task}.yaml"
+    path = shipped_directory("conf") / "task" / f"{task}.yaml"
     numbers = yaml.safe_load(path.read_text(encoding="utf-8"))["budgets"][budget]
     del numbers["sweep_episodes"]
     executor = Executor("threads", 1)

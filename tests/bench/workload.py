@@ -60,7 +60,7 @@ def find_workload(count: int) -> Workload:
     """The first `count` untrained genomes that do not fall.
 
     Raises:
-        VerificationError: too few of the random genomes keep upright, or nothing is compiled here.
+        VerificationError: too few of the random genomes keep upright.
     """
     (shape,) = PLAN.subpopulation_shapes
     config = neat_config(SETTINGS, CANDIDATES, shape)
@@ -68,8 +68,6 @@ def find_workload(count: int) -> Workload:
     (seeds,) = shared_episodes("test", 1)
     candidates = Workload(config, genomes, seeds)
     with open_runner(threads=1) as runner:
-        if not runner.compiled:
-            raise VerificationError("compiled code cannot call MuJoCo here, so there is nothing to measure")
         outcomes = runner.run(candidates.brains(), [seeds])
     upright = np.flatnonzero((outcomes.steps[:, 0] == TASK.max_steps) & ~outcomes.failed[:, 0])
     if len(upright) < count:

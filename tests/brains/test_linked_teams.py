@@ -16,10 +16,7 @@ from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_modules
 from tests.brains.teams import STEPS, Cross, actions_of, busy, random_team
 
-ACTIVATIONS: dict[str, Callable[[float], float]] = {
-    "tanh": lambda z: math.tanh(2.5 * z),
-    "relu": lambda z: max(z, 0.0),
-}
+ACTIVATIONS: dict[str, Callable[[float], float]] = {"tanh": lambda z: math.tanh(2.5 * z), "relu": lambda z: max(z, 0.0)}
 GRID = busy(RECURRENT, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
 
 

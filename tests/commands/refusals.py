@@ -22,7 +22,7 @@ budgets:
 """A task file of a user's own that is sound."""
 
 
-def check_message(code: int, message: str, named: Sequence[str]) -> None:
+def check_message(code: int, message: str, *named: str) -> None:
     """Assert that a command refused in our words, and named what it should."""
     assert code == 2, message
     assert message.startswith("exneat:"), message
@@ -37,11 +37,16 @@ def check_message(code: int, message: str, named: Sequence[str]) -> None:
 def check_refusal(
     arguments: Sequence[str], named: Sequence[str], folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Run a command in `folder`, and assert that it was refused and made nothing."""
-    before = sorted(folder.rglob("*"))
+    """Run a command in `folder`, and assert that it was refused and changed nothing."""
+    before = contents(folder)
     capfd.readouterr()
     code = main(list(arguments))
     captured = capfd.readouterr()
-    check_message(code, captured.err, named)
+    check_message(code, captured.err, *named)
     assert not captured.out
-    assert sorted(folder.rglob("*")) == before
+    assert contents(folder) == before
+
+
+def contents(folder: Path) -> dict[str, bytes | None]:
+    """Every file below a folder with its bytes, every directory and pipe without."""
+    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}

@@ -1,8 +1,9 @@
-"""What users get wrong: at most three lines, exit code 2, no traceback, nothing half-made."""
+"""What users get wrong on the command line: at most three lines, exit code 2, no traceback, nothing half-made."""
 
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,199 +11,278 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.main import main
+from tests.commands.refusals import check_message, check_refusal
 
-LONGEST = 3
-
-
-def overrides(output: Path) -> list[str]:
-    return ["budget=smoke", f"output={output}"]
-
-
+TRAIN = {
+    # what is given besides budget=smoke output=out, and what the message must name
+    "sed=3": "sed: unknown key (value 3)\n  did you mean seed?",
+    "+sed=3": "did you mean seed?",
+    "++sed=3": "did you mean seed?",
+    "buget=paper": "did you mean budget?",
+    "+task.foo=1": "task.foo: unknown key",
+    "task.max_step=5": "did you mean task.max_steps?",
+    "+wiring.foo=1": "wiring.foo: unknown key",
+    "+evolution.elitsm=1": "did you mean evolution.elitism?",
+    "algorithm.kept=1": "algorithm.kept: unknown key",
+    "executor=serial executor.workers=2": "executor.workers: expected a whole number from 0 to 1, got 2",
+    "seed=-1": "seed: expected a whole number from 0 to 18446744073709551615, got -1",
+    "seed=abc": "seed: expected a whole number",
+    "seed=1.5": "seed: expected",
+    "seed=true": "seed: expected",
+    "seed=null": "seed: expected",
+    "seed=": "seed: expected",
+    "seed==3": "seed: expected a whole number from 0 to 18446744073709551615, got '=3'",
+    "seed.x=1": "seed: expected",
+    "seed=1,2": "seed=1,2: expected one value, got several\n  exneat train -m goes through them",
+    "'seed=choice(1,2)'": "expected one value, got several",
+    "seed=99999999999999999999999999999999999999": "seed: expected",
+    "generations=0": "generations: expected a whole number of at least 1, got 0",
+    "generations=many": "generations: expected",
+    "generations=1e3": "generations: expected a whole number of at least 1, got 1000.0",
+    "generations=1e999": "generations: expected",
+    "population=1": "population: expected",
+    "episodes=-3": "episodes: expected",
+    "pairing=best": "pairing: expected one of rank, index",
+    "resume=1": "resume: expected true or false, got 1",
+    "noise.sensor_std=nan": "noise.sensor_std: expected",
+    "noise.sensor_std=-0.1": "noise.sensor_std: expected",
+    "noise.sensor_std=inf": "noise.sensor_std: expected",
+    "noise.sensor_std=true": "noise.sensor_std: expected",
+    "noise.reset_scale=[1]": "noise.reset_scale: expected",
+    "task.patience=-1": "task.patience: expected",
+    "task.patience=99999999999999999999": "task.patience: expected",
+    "task.max_steps=null": "task.max_steps: expected",
+    "task.reward=full": "task.reward: expected one of thesis, gymnasium, got 'full'",
+    "task.part_order=random": "task.part_order: expected",
+    "evolution.activation_default=swish": "evolution.activation_default: expected",
+    "evolution.survival_threshold=2": "evolution.survival_threshold: expected",
+    "+budgets.quik.generations=3": "budgets.quik: expected one of paper, quick, smoke",
+    "+budgets.smoke.generation=3": "did you mean budgets.smoke.generations?",
+    "budgets=1": "generations: ",
+    "wiring=3": "wiring: expected a section",
+    "wiring.central=maybe": "wiring.central: expected true or false",
+    "wiring.central=false wiring.output_width=3": "wiring.output_width: expected",
+    "name=../../x": "name: expected one folder name",
+    "name=/etc": "name: expected one folder name",
+    "name=": "name: expected one folder name",
+    "name=..": "name: expected one folder name",
+    "'name=a b'": "name: expected one folder name of letters, digits, '.', '_' and '-', got 'a b'",
+    "name=a}": "got 'a}'",
+    "name=ä": "got 'ä'",
+    "'name=${a'": "name='${a'",
+    "'name=${nope:1}'": "name: Unsupported interpolation type nope",
+    "'name=${name}'": "name: Recursive interpolation",
+    "'name=${nowhere.at.all}'": "name: Interpolation key 'nowhere.at.all' not found",
+    "'name=${oc.env:EXNEAT_NO_SUCH_THING}'": "EXNEAT_NO_SUCH_THING",
+    "'seed=${generations}' 'generations=${seed}'": "Recursive interpolation",
+    "name=???": "name: Missing mandatory value",
+    "output=": "output: expected a directory",
+    "output=null": "output: expected a directory",
+    "output=[a]": "output: expected a directory, got ['a']",
+    "task=atn": "task=atn: no such option; known: ant, foraging, general_maze, hunting, track_maze",
+    "task=": "task=: no such option; known: ant",
+    "task=null": "task: expected the name of an option, got None",
+    "task=3": "task: expected the name of an option, got 3",
+    "'task={name: ant}'": "task: expected the name of an option",
+    "task=[ant,hunting]": "task: expected one option, got ['ant', 'hunting']\n  exneat train -m task=",
+    "geometry=triangle": "geometry=triangle: no such option; known: all, cross, custom, fb, lr, single",
+    "linkage=lines": "linkage=lines: no such option; known: feedback",
+    "executor=mpi": "executor=mpi: no such option; known: dask, serial, threads",
+    "sweep=3": "sweep: expected the name of an option, got 3",
+    "sweep=[gap,wind]": "sweep=wind: no such option; known: gap",
+    "~seed": "~seed: a setting cannot be deleted",
+    "~task": "~task: a setting cannot be deleted",
+    "geometry=custom": "geometry.vector: expected",
+    "geometry=custom geometry.vector=[0,2]": "without gaps",
+    "geometry=custom geometry.vector=[0,1]": "4 entries",
+    "geometry=custom geometry.vector=[true,0,0,0]": "geometry.vector: expected",
+    "geometry=custom geometry.vector=abc": "geometry.vector: expected",
+    "geometry=custom geometry.vector=[0,0": "geometry.vector: expected",
+    "geometry=all geometry.vector=[0,0,1,1]": "geometry=custom",
+    "algorithm=neat geometry=all": "algorithm=neat has no part modules",
+    "algorithm=random linkage=output": "algorithm=random has no part modules",
+    "algorithm=linear_fusion": "only grid worlds have it",
+    "linkage=feedback wiring.central=false": "wiring.central=true",
+    "linkage=hidden evolution.module_hidden=0": "evolution.module_hidden",
+    "task=track_maze task.size=12": "task.size: expected an odd number",
+    "task=track_maze task.size=3": "task.size: expected a whole number from 5 to 99",
+    "task=track_maze task.size=big": "task.size: expected",
+    "task=track_maze task.gap=6": "task.gap: expected a whole number from 0 to 5, got 6",
+    "task=track_maze task.cue_noise=-1": "task.cue_noise: expected",
+    "task=track_maze task.fitness=speed": "task.fitness: expected one of time_and_progress, time",
+    "task=track_maze task.patience=3": "task.patience: unknown key",
+    "task=track_maze wiring.central=true": "task=track_maze has no trunk",
+    "task=track_maze geometry=fb": "geometry: expected single, all or custom",
+    "task=track_maze linkage=hidden": "evolution.module_hidden",
+    "task=track_maze linkage=feedback": "has no trunk for one",
+    "task=track_maze noise.reset_scale=0.3": "has no initial pose",
+    "task=general_maze task.size=10": "task.size: expected an odd number",
+    "task=general_maze task.cues_removed=1.1": "task.cues_removed: expected a number from 0 to 1",
+    "task=general_maze task.walls_removed=-0.2": "task.walls_removed: expected a number from 0 to 1",
+    "task=general_maze task.gap=1": "task.gap: unknown key",
+    "task=foraging task.n_prey=100": "task.n_prey: expected a whole number from 1 to 99, got 100",
+    "task=foraging task.n_prey=0": "task.n_prey: expected",
+    "task=foraging task.steps=0": "task.steps: expected",
+    "task=foraging task.steps=23302": "task.steps: expected at most 23301 for this size and n_prey, got 23302",
+    "task=foraging task.size=99 task.n_prey=100": "task.steps: expected at most 32 for this size and n_prey",
+    "task=foraging task.p_e=1.5": "task.p_e: expected",
+    "task=foraging task.p_c=nan": "task.p_c: expected",
+    "task=foraging task.p_m=0.5": "task.p_m: unknown key",
+    "task=foraging task.patch_width=4": "task.patch_width: expected an odd number",
+    "task=foraging task.size=2": "task.size: expected",
+    "task=hunting task.steps=1000000": "task.steps: expected at most 11650 for this size and n_prey, got 1000000",
+    "task=hunting task.size=99 task.n_prey=9800": "task.n_prey: expected at most 1644 for this size, got 9800",
+    "task=hunting task.p_m=-0.5": "task.p_m: expected",
+    "task=hunting task.motion=random": "task.motion: expected one of levy, brownian",
+    "sweep=gap": "sweep: expected a sweep that fits task=ant, got 'gap'",
+    "sweep=reset_noise sweep.levels=[true]": "sweep.levels: expected finite numbers",
+    "sweep=reset_noise sweep.levels=[0,0]": "sweep.levels: expected levels that all differ",
+    "sweep.episodes=0": "sweep.episodes: expected",
+    "seed": "seed: expected key=value",
+    "seed:3": "seed:3: expected key=value",
+    "=3": "=3: expected key=value, got no key",
+    "===": "===: expected key=value",
+    "+": "+: expected key=value",
+    "hydra.run.dir=x": "hydra.run.dir=x: exneat sets hydra.run.dir itself\n  hydra/launcher=",
+    "hydra.output_subdir=x": "exneat sets hydra.output_subdir itself",
+    "hydra.job.chdir=true": "exneat sets hydra.job.chdir itself",
+    "hydra/job_logging=default": "exneat sets hydra.job_logging itself",
+    "hydra.searchpath=[nowhere]": "exneat sets hydra.searchpath itself",
+    "+hydra.callbacks.x._target_=os.getcwd": "exneat sets hydra.callbacks.x._target_ itself",
+    "hydra=1": "hydra",
+    "hydra/launcher=nope": "hydra/launcher=nope: no such option; known: basic",
+    "hydra/launcher=joblib hydra.launcher.njobs=2": "hydra.launcher.njobs: unknown key; known here: _target_, n_jobs",
+    "hydra/launcher=joblib +hydra.launcher.x._target_=os.getcwd": "a configuration may not call code",
+    "--bogus": "--bogus: unknown flag; settings are written key=value",
+    "--multrun": "--multrun: unknown flag; did you mean --multirun?",
+    "--config-dir": "--config-dir: expected one argument",
+    "--config-dir nowhere": "nowhere: expected a directory with YAML files, got nothing",
+    "--config-path nowhere": "nowhere: expected a directory with YAML files, got nothing",
+    "--config-dir a_file": "a_file: expected a directory with YAML files, got a file",
+    "--config-name nope": "--config-name=nope: no such option; known: config",
+    "--cfg everything": "--cfg: invalid choice: 'everything'",
+}
+OTHERS = {
+    "fly": "fly: expected a command, one of train",
+    "'\x1b[31mfly'": "fly: expected a command",
+    "inspect run=nowhere": "run=nowhere: no run is there",
+    "inspect run=": "run: expected a run directory",
+    "inspect run=3": "run: expected a run directory, got 3",
+    "inspect somewhere": "somewhere: expected key=value",
+    "inspect outptu=x": "did you mean output?",
+    "inspect --all": "--all: unknown flag",
+    "doctor output=": "output: expected a directory",
+    "doctor run=outputs": "run: unknown key (value 'outputs')\n  known here: output",
+    "doctor quickly": "quickly: expected key=value",
+    "doctor -m": "-m: exneat train alone goes through several values",
+    "evaluate": "sweep: expected what to perturb",
+    "evaluate sweep=gap": "run: expected a run directory",
+    "evaluate run=nowhere sweep=gap": "run=nowhere: no run is there",
+    "evaluate run=a_file sweep=gap": "run=a_file: no run is there",
+    "evaluate run=no*thing sweep=gap": "run: expected a run directory, or a pattern",
+    "evaluate run=[a sweep=gap": "run: expected a run directory, or a pattern that fits some, got '[a'",
+    "evaluate run=3 sweep=gap": "run: expected a run directory, or a pattern such as 'outputs/ant/*', got 3",
+    "evaluate --what sweep=gap": "--what: unknown flag",
+    "report": "output=outputs: no finished run of ant",
+    "report budget=huge": "budget=huge: no such option; known: paper, quick, smoke",
+    "report budget=": "budget=: no such option",
+    "report only=figure-9.9": "only: expected one of figure-4.1",
+    "report only=figure-4.1": "no finished run of track_maze\n  exneat sweep experiment=track_maze budget=quick",
+    "report onyl=figure-4.1": "did you mean only?",
+    "report axis=time": "axis: expected one of generation, episodes, env_steps",
+    "report experiment=chess": "experiment: expected one of ant",
+    "report experiment=../x": "experiment: expected one of ant",
+    "report experiment=nowhere.yaml": "nowhere.yaml: could not be read: No such file",
+    "report sed=3": "did you mean seed?",
+    "report --all": "--all: unknown flag",
+    "sweep": "experiment: expected a name or a YAML file",
+    "sweep experiment=": "experiment: expected a name or a YAML file",
+    "sweep experiment=chess": "experiment: expected one of ant, foraging",
+    "sweep experiment=nowhere.yaml": "nowhere.yaml: could not be read",
+    "sweep experiment=ant budget=": "budget=: no such option",
+    "sweep experiment=ant budget=huge": "budget=huge: no such option; known: paper, quick, smoke",
+    "sweep experiment=ant seed=0,1": "seed=0,1: expected one value, got several",
+    "sweep experiment=ant noise=5": "noise: expected the name of an option, got 5",
+    "sweep experiment=ant sed=3": "did you mean seed?",
+    "sweep experiment=ant generations=0": "ant, walk, neat: generations: expected",
+    "sweep experiment=ant noise.sensor_std=nan": "noise.sensor_std: expected",
+    "sweep experiment=ant hydra.sweep.subdir=x": "exneat sets hydra.sweep.subdir itself",
+    "sweep experiment=ant --fast": "--fast: unknown flag",
+}
 CASES = [
-    # what is given, and what the message must name
-    (["sed=3"], "sed: unknown key"),
-    (["+sed=3"], "did you mean seed?"),
-    (["+task.foo=1"], "task.foo: unknown key"),
-    (["task.max_step=5"], "task.max_step: unknown key"),
-    (["+evolution.elitsm=1"], "did you mean evolution.elitism?"),
-    (["executor=serial", "executor.workers=2"], "executor.workers: unknown key"),
-    (["seed=-1"], "seed: expected a whole number from 0 to 18446744073709551615, got -1"),
-    (["seed=abc"], "seed: expected"),
-    (["seed=1.5"], "seed: expected"),
-    (["seed=true"], "seed: expected"),
-    (["seed=null"], "seed: expected"),
-    (["seed=1,2"], "--multirun"),
-    (["generations=0"], "generations: expected"),
-    (["generations=many"], "generations: expected"),
-    (["population=1"], "population: expected"),
-    (["episodes=-3"], "episodes: expected"),
-    (["noise.sensor_std=nan"], "noise.sensor_std: expected"),
-    (["noise.sensor_std=-0.1"], "noise.sensor_std: expected"),
-    (["noise.sensor_std=inf"], "noise.sensor_std: expected"),
-    (["noise.reset_scale=[1]"], "noise.reset_scale: expected"),
-    (["task.patience=-1"], "task.patience: expected"),
-    (["task.max_steps=null"], "task.max_steps: expected"),
-    (["task.reward=full"], "task.reward: expected one of thesis, gymnasium, got 'full'"),
-    (["task.part_order=random"], "task.part_order: expected"),
-    (["evolution.activation_default=swish"], "evolution.activation_default: expected"),
-    (["evolution.survival_threshold=2"], "evolution.survival_threshold: expected"),
-    (["pairing=best"], "pairing: expected"),
-    (["task.patience=99999999999999999999"], "task.patience: expected"),
-    (["seed=" + "9" * 300], "seed: expected"),
-    (["+budgets.quik.generations=3"], "budgets.quik: expected one of paper, quick, smoke"),
-    (["+budgets.smoke.generation=3"], "budgets.smoke.generation: expected one of"),
-    (["task=atn"], "task=atn: no such option; known: ant, foraging, general_maze, hunting, track_maze"),
-    (["geometry=triangle"], "geometry=triangle: no such option; known: all, cross, custom, fb, lr, single"),
-    (["task=null"], "Config group override"),
-    (["~task"], "~task: a setting cannot be deleted"),
-    (["geometry=custom"], "geometry.vector: expected"),
-    (["geometry=custom", "geometry.vector=[0,2]"], "without gaps"),
-    (["geometry=custom", "geometry.vector=[0,1]"], "4 entries"),
-    (["geometry=custom", "geometry.vector=abc"], "geometry.vector: expected"),
-    (["geometry=all", "geometry.vector=[0,0,1,1]"], "geometry=custom"),
-    (["algorithm=neat", "geometry=all"], "algorithm=neat has no part modules"),
-    (["algorithm=random", "linkage=output"], "algorithm=random has no part modules"),
-    (["linkage=feedback", "wiring.central=false"], "wiring.central=true"),
-    (["linkage=hidden", "evolution.module_hidden=0"], "evolution.module_hidden"),
-    (["task=track_maze", "task.size=12"], "task.size: expected an odd number"),
-    (["task=track_maze", "task.size=3"], "task.size: expected a whole number from 5 to 99"),
-    (["task=track_maze", "task.size=big"], "task.size: expected"),
-    (["task=track_maze", "task.gap=6"], "task.gap: expected a whole number from 0 to 5, got 6"),
-    (["task=track_maze", "task.cue_noise=-1"], "task.cue_noise: expected"),
-    (["task=track_maze", "task.fitness=speed"], "task.fitness: expected one of time_and_progress, time"),
-    (["task=track_maze", "task.patience=3"], "task.patience: unknown key"),
-    (["task=track_maze", "wiring.central=true"], "task=track_maze has no trunk"),
-    (["task=track_maze", "geometry=fb"], "geometry: expected single, all or custom"),
-    (["task=track_maze", "linkage=hidden"], "evolution.module_hidden"),
-    (["task=track_maze", "linkage=feedback"], "has no trunk for one"),
-    (["task=track_maze", "noise.reset_scale=0.3"], "has no initial pose"),
-    (["task=general_maze", "task.size=10"], "task.size: expected an odd number"),
-    (["task=general_maze", "task.cues_removed=1.1"], "task.cues_removed: expected a number from 0 to 1"),
-    (["task=general_maze", "task.walls_removed=-0.2"], "task.walls_removed: expected a number from 0 to 1"),
-    (["task=general_maze", "task.gap=1"], "task.gap: unknown key"),
-    (["task=foraging", "task.n_prey=100"], "task.n_prey: expected a whole number from 1 to 99, got 100"),
-    (["task=foraging", "task.n_prey=0"], "task.n_prey: expected"),
-    (["task=foraging", "task.steps=0"], "task.steps: expected"),
-    (["task=foraging", "task.steps=23302"], "task.steps: expected at most 23301 for this size and n_prey, got 23302"),
-    (["task=foraging", "task.size=99", "task.n_prey=100"], "task.steps: expected at most 32 for this size and n_prey"),
-    (
-        ["task=hunting", "task.steps=1000000"],
-        "task.steps: expected at most 11650 for this size and n_prey, got 1000000",
-    ),
-    (
-        ["task=hunting", "task.size=99", "task.n_prey=9800"],
-        "task.n_prey: expected at most 1644 for this size, got 9800",
-    ),
-    (["task=foraging", "task.p_e=1.5"], "task.p_e: expected"),
-    (["task=foraging", "task.p_c=nan"], "task.p_c: expected"),
-    (["task=foraging", "task.p_m=0.5"], "task.p_m: unknown key"),
-    (["task=foraging", "task.patch_width=4"], "task.patch_width: expected an odd number"),
-    (["task=foraging", "task.size=2"], "task.size: expected"),
-    (["task=hunting", "task.p_m=-0.5"], "task.p_m: expected"),
-    (["task=hunting", "task.motion=random"], "task.motion: expected one of levy, brownian"),
-    (["algorithm=linear_fusion"], "only grid worlds have it"),
-    (["wiring.central=maybe"], "wiring.central: expected true or false"),
-    (["wiring.central=false", "wiring.output_width=3"], "wiring.output_width: expected"),
-    (["wiring=3"], "wiring: expected a section"),
-    (["name=../../x"], "name: expected one folder name"),
-    (["name=/etc"], "name: expected one folder name"),
-    (["name="], "name: expected one folder name"),
-    (["seed"], "missing EQUAL"),
-    (["seed=[1,2"], "no viable alternative"),
-    (["--bogus"], "--bogus: unknown flag"),
-    (["--config-dir"], "expected a value after it"),
-    (["--config-dir", "nowhere-at-all"], "nowhere-at-all"),
-    (["--cfg", "everything"], "--cfg: expected one of job, hydra, all"),
+    *((["train", "budget=smoke", "output=out", *shlex.split(given)], named) for given, named in TRAIN.items()),
+    *((shlex.split(given), named) for given, named in OTHERS.items()),
 ]
 
 
-def assert_refused(code: int, message: str, named: str) -> None:
-    assert code == 2, message
-    assert named in message
-    assert "Traceback" not in message
-    assert 1 <= len(message.strip().splitlines()) <= LONGEST, message
-
-
-@pytest.mark.parametrize(("given", "named"), CASES, ids=[" ".join(given)[:60] for given, _ in CASES])
-def test_bad_settings_are_refused_before_anything_is_made(
-    given: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("arguments", "named"), CASES, ids=[ascii(given) for given in (*TRAIN, *OTHERS)])
+def test_a_command_line_that_makes_no_sense_is_refused_before_anything_is_made(
+    arguments: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code = main(["train", *overrides(tmp_path / "out"), *given])
-    captured = capfd.readouterr()
-    assert_refused(code, captured.err, named)
-    assert not captured.out
-    assert not list(tmp_path.iterdir())
+    (tmp_path / "a_file").touch()
+    check_refusal(arguments, [named], tmp_path, capfd)
 
 
-def test_an_output_that_is_a_file_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_output_that_cannot_be_made_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
-    code = main(["train", *overrides(tmp_path / "file")])
-    assert_refused(code, capfd.readouterr().err, "the directory cannot be made")
-
-
-@pytest.mark.skipif(os.name != "posix" or os.getuid() != 0, reason="permissions bind everyone but root")
-def test_an_output_on_a_file_system_that_cannot_be_written_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
-    code = main(["train", *overrides(Path("/proc/exneat"))])
-    assert_refused(code, capfd.readouterr().err, "/proc/exneat")
-
-
-def test_an_output_with_an_overlong_name_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    long = tmp_path / ("x" * 300)
-    assert_refused(main(["train", *overrides(long)]), capfd.readouterr().err, "File name too long")
-    assert_refused(main(["inspect", f"run={long}"]), capfd.readouterr().err, "no run is there")
-    assert main(["inspect", f"output={long}"]) in (0, 2)
-    assert "Traceback" not in capfd.readouterr().err
-
-
-def test_a_directory_that_cannot_be_written_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    long = "x" * 300
+    train = ["train", "budget=smoke"]
+    check_refusal([*train, "output=file"], ["the run directory cannot be made"], tmp_path, capfd)
+    check_refusal([*train, f"output={long}"], ["File name too long"], tmp_path, capfd)
+    check_refusal(["inspect", f"run={long}"], ["no run is there"], tmp_path, capfd)
     if os.getuid() == 0:
-        pytest.skip("root may write everywhere")
-    tmp_path.chmod(0o500)
-    code = main(["train", *overrides(tmp_path / "out")])
-    assert_refused(code, capfd.readouterr().err, "Permission denied")
+        check_refusal([*train, "output=/proc/exneat"], ["/proc/exneat"], tmp_path, capfd)
+    else:
+        tmp_path.chmod(0o500)
+        check_refusal([*train, "output=out"], ["Permission denied"], tmp_path, capfd)
 
 
 def test_a_directory_that_holds_something_else_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", *overrides(tmp_path), "algorithm=random"]) == 0
+    command = ["train", "budget=smoke", f"output={tmp_path}", "algorithm=random"]
+    assert main(command) == 0
     (run,) = (tmp_path / "ant").iterdir()
-    capfd.readouterr()
     (run / "manifest.json").unlink()
-    assert_refused(main(["train", *overrides(tmp_path), "algorithm=random"]), capfd.readouterr().err, "manifest.json")
+    check_refusal(command, ["manifest.json"], tmp_path, capfd)
     (run / "manifest.json").write_text("{")
-    assert_refused(main(["train", *overrides(tmp_path), "algorithm=random"]), capfd.readouterr().err, "manifest.json")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["fly"], "fly: expected a command"),
-        (["inspect", "run=nowhere"], "no run is there"),
-        (["inspect", "somewhere"], "expected run="),
-        (["inspect", "run="], "expected run="),
-        (["doctor", "output="], "expected output="),
-        (["doctor", "run=outputs"], "expected output="),
-        (["doctor", "quickly"], "quickly: expected output="),
-    ],
-)
-def test_bad_commands_are_refused(arguments: list[str], named: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert_refused(main(arguments), capfd.readouterr().err, named)
+    check_refusal(command, ["manifest.json"], tmp_path, capfd)
 
 
 def test_a_bad_job_of_a_multirun_leaves_the_others_alone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    code = main(["train", "-m", *overrides(tmp_path), "algorithm=random", "seed=0,-1,2"])
+    code = main(["train", "-m", "budget=smoke", f"output={tmp_path}", "algorithm=random", "seed=0,-1,2"])
     error = capfd.readouterr().err
     assert code == 2
-    assert "seed=-1: seed: expected a whole number" in error
+    assert "exneat: seed=-1: seed: expected a whole number" in error
     assert "Traceback" not in error
     assert sorted(path.name.rsplit("-", 1)[0] for path in (tmp_path / "ant").iterdir()) == ["random-s0", "random-s2"]
     assert [path.name for path in tmp_path.iterdir()] == ["ant"]
 
 
-def test_the_same_holds_for_the_installed_program(tmp_path: Path) -> None:
-    program = Path(sys.executable).parent / "exneat"
-    done = subprocess.run(
-        [program, "train", "seed=x", *overrides(tmp_path / "out")], capture_output=True, text=True, check=False
-    )
-    assert_refused(done.returncode, done.stderr, "seed: expected")
+@pytest.mark.parametrize(
+    ("output", "place"),
+    [("a b", "a b"), ("runs [1] (é)", "runs [1] (é)"), ("'3'", "3"), ("~/x", "home/x"), ("'~'", "~"), ("it's", "it's")],
+)
+def test_a_value_means_the_same_in_every_command_whatever_its_characters(
+    output: str, place: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+    assert main(["train", "task=track_maze", "algorithm=motionless", "budget=smoke", f"output={output}"]) == 0
+    (run,) = (tmp_path / place / "track_maze").iterdir()
+    assert main(["inspect", f"output={output}"]) == 0
+    assert run.name in capfd.readouterr().out
+    asked = output.removesuffix("'") + f"/track_maze/{run.name}" + "'" * output.endswith("'")
+    assert main(["evaluate", f"run={asked}", "sweep=gap", "sweep.levels=[1]", "sweep.episodes=1"]) == 0
+    check_refusal(["report", f"output={output}"], [place, "no finished run of ant"], tmp_path, capfd)
+
+
+def test_the_installed_program_refuses_in_the_same_words(tmp_path: Path) -> None:
+    program = [str(Path(sys.executable).parent / "exneat"), "train", "seed=x", "output=out"]
+    done = subprocess.run(program, capture_output=True, text=True, check=False, cwd=tmp_path)
+    check_message(done.returncode, done.stderr, "seed: expected")
     assert not done.stdout
+    assert not list(tmp_path.iterdir())

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from exneat_cli.tasks.robots.simulator_trial import Physics
 
 from exneat_cli import compiling
 from exneat_cli.commands import findings, installation
@@ -22,7 +23,6 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import disk, provenance
 from exneat_cli.tasks.robots import simulator_trial
-from exneat_cli.tasks.robots.simulator_trial import Physics
 
 Ask = Callable[..., tuple[int, dict[str, str], str]]
 LINE = re.compile(r"^(ok|degraded|broken) +(\S+(?: \S+)*?)(?:  +|$)", re.MULTILINE)
@@ -153,9 +153,7 @@ def test_a_part_that_cannot_be_loaded_is_broken_and_the_rest_is_left_alone(
     real = importlib.import_module
     failing = raising(ImportError("libGL.so.1: cannot open shared object file"))
     monkeypatch.setattr(
-        installation.importlib,
-        "import_module",
-        lambda name: failing() if name == "exneat_cli.analysis" else real(name),
+        installation.importlib, "import_module", lambda name: failing() if name == "exneat_cli.analysis" else real(name)
     )
     _, states, printed = ask()
     assert states["loading"] == findings.BROKEN

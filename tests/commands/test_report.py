@@ -9,10 +9,11 @@ import pytest
 import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
-from exneat_cli.commands.experiments import experiment_names, experiments_directory, read_experiment
+from exneat_cli.commands.command_line import shipped_directory
+from exneat_cli.commands.experiments import experiment_names, read_experiment
 from exneat_cli.main import main
 
-CATALOGUE = read_catalogue(experiments_directory() / "catalogue.yaml")
+CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
 IDS = [
     *(f"figure-4.{k}" for k in range(1, 21)),
     *(f"figure-5.{k}" for k in range(1, 8)),
@@ -26,7 +27,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All five experiments at smoke size."""
     output = tmp_path_factory.mktemp("smoke") / "outputs"
     with pytest.MonkeyPatch.context() as patch:  # the figures of single runs are not looked at here, and slow
-        patch.setattr("exneat_cli.commands.sweep.draw_what_is_missing", lambda *arguments, **options: None)
+        patch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
         for name in experiment_names():
             assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
     return output
@@ -110,31 +111,6 @@ def test_an_experiment_of_the_users_own_gets_figures_and_a_comparison(tmp_path: 
     made = set(contents(output / "report" / "mine"))
     assert {"training-calm.svg", "robustness-calm-p_m.svg", "comparison-mine.csv", "index.html"} <= made
     assert "It works with mine." in (output / "report" / "mine" / "index.html").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        ([], "no finished run of ant"),
-        (["only=figure-9.9"], "only: expected one of figure-4.1"),
-        (["only=figure-4.1"], "no finished run of track_maze"),
-        (["budget=huge"], "budget: expected one of paper, quick, smoke"),
-        (["axis=time"], "axis: expected one of generation, episodes, env_steps"),
-        (["experiment=chess"], "experiment: expected one of ant"),
-        (["experiment=nowhere.yaml"], "could not be read"),
-        (["--all"], "--all: expected key=value"),
-        (["sed=3"], "sed: unknown key"),
-    ],
-)
-def test_bad_input_is_refused_in_three_lines_and_nothing_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], named: str
-) -> None:
-    assert report(tmp_path / "outputs", *arguments) == 2
-    message = capsys.readouterr().err
-    assert named in message
-    assert "Traceback" not in message
-    assert len(message.strip().splitlines()) <= 3
-    assert not list(tmp_path.iterdir())
 
 
 def test_every_condition_and_variant_of_the_catalogue_is_one_of_its_experiment() -> None:

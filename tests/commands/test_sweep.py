@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
 from pathlib import Path
 
 import pytest
 import yaml
 
+from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.experiments import experiment_names, plan_jobs, read_experiment
+from exneat_cli.commands.jobs import Job
+from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, read_robustness
+from exneat_cli.runs import RunSettings
+from tests.commands.refusals import check_refusal, contents
 
 SMALL = {
     "claim": "Modules beat one network.",
@@ -43,8 +49,9 @@ def sweep(folder: Path, *arguments: str) -> int:
     return main(["sweep", f"experiment={path}", "budget=smoke", f"output={folder / 'out'}", *arguments])
 
 
-def contents(folder: Path) -> dict[Path, bytes]:
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+def plan(folder: Path, *settings: str, name: str = "", budget: str = "smoke") -> list[Job]:
+    line = read_command_line("sweep", [f"output={folder / 'out'}", *settings])
+    return plan_jobs(read_experiment(name or str(folder / "small.yaml")), budget, line, ("experiment",))
 
 
 def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing(
@@ -68,8 +75,8 @@ def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing
 def test_a_job_that_fails_leaves_the_others_alone_and_is_named_at_the_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = write(tmp_path)
-    jobs = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])
+    write(tmp_path)
+    jobs = plan(tmp_path)
     spoilt = jobs[1].settings.directory.path
     spoilt.parent.mkdir(parents=True)
     spoilt.write_text("in the way")
@@ -112,8 +119,8 @@ def test_side_by_side_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None:
-    experiment = read_experiment(str(write(tmp_path)))
-    jobs = plan_jobs(experiment, "quick", ["generations=3", "task.gap=2", "seed=7"])
+    write(tmp_path)
+    jobs = plan(tmp_path, "generations=3", "task.gap=2", "seed=7", budget="quick")
     assert {job.settings.generations for job in jobs} == {3}
     assert {job.settings.task.gap for job in jobs} == {2}  # type: ignore[attr-defined]
     assert sorted({job.settings.seed for job in jobs}) == [7, 8]
@@ -121,8 +128,8 @@ def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("name", experiment_names())
 @pytest.mark.parametrize("budget", ["paper", "quick", "smoke"])
-def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, budget: str) -> None:
-    jobs = plan_jobs(read_experiment(name), budget)
+def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, budget: str, tmp_path: Path) -> None:
+    jobs = plan(tmp_path, name=name, budget=budget)
     assert len({job.settings.directory.path for job in jobs}) == len(jobs) == len({job.name for job in jobs})
 
 
@@ -131,91 +138,20 @@ def test_experiments_have_ten_runs_on_paper_and_three_when_quick() -> None:
         assert read_experiment(name).runs == {"paper": 10, "quick": 3, "smoke": 1}
 
 
-BAD_FILES = [
-    ({"variants": {}}, "variants: expected at least one entry"),
-    ({"conditions": {}}, "conditions: expected at least one entry"),
-    ({"variants": ["neat"]}, "variants: expected a value of type Mapping"),
-    ({"variants": {"neat": {"label": "NEAT"}}}, "variants.neat: settings is missing"),
-    (
-        {"variants": {"neat": {"label": "NEAT", "settings": [1]}}},
-        "variants.neat: settings: expected a value of type Mapping",
-    ),
-    ({"variants": {"neat": {"label": [1], "settings": {}}}}, "variants.neat: label: expected a value of type str"),
-    (
-        {"variants": {"neat": {"label": "NEAT", "settings": {}, "swept": "no"}}},
-        "variants.neat: swept: expected a value",
-    ),
-    ({"variants": {"neat": {"label": "NEAT", "settings": {}, "sweeps": []}}}, "variants.neat: sweeps: unknown key"),
-    ({"variants": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),
-    (
-        {"variants": {"neat": {"label": "NEAT", "settings": {"seed": 3}}}},
-        "variants.neat.settings.seed: expected another",
-    ),
-    (
-        {"variants": {"neat": {"label": "NEAT", "settings": {"++seed": 3}}}},
-        "variants.neat.settings.++seed: expected another",
-    ),
-    ({"settings": {"output": "elsewhere"}}, "settings.output: expected another setting"),
-    ({"settings": {"sweep": {"levels": [1]}}}, "settings.sweep: expected another setting"),
-    ({"settings": {"hydra.job.name": "x"}}, "settings.hydra.job.name: expected another setting"),
-    ({"settings": {"task.gap": datetime.date(2020, 1, 1)}}, "settings.task.gap: expected a word, a number"),
-    ({"variants": {"neat": {"label": "NEAT", "settings": {}, "runs": 0}}}, "variants.neat.runs: expected"),
-    ({"variants": {"neat": {"label": "NEAT", "settings": {"algorithm": "nead"}}}}, "algorithm=nead: no such option"),
-    ({"variants": {"neat": {"label": "NEAT", "settings": {"sed": 3}}}}, "small, clean, neat: sed: unknown key"),
-    (
-        {"variants": {k: {"label": k, "settings": {"algorithm": "neat"}} for k in "ab"}},
-        "clean/a/0 and clean/b/0 are the",
-    ),
-    ({"conditions": {"a": {"label": "a", "settings": {"task.gap": 99}}}}, "small, a, exneat: task.gap: expected"),
-    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": "gap"}}}, "sweeps: expected a value of type list"),
-    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": [1]}}}, "conditions.a.sweeps: expected names"),
-    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["p_m"]}}}, "fits task=track_maze"),
-    ({"conditions": {"a": {"label": "a", "settings": {}, "sweeps": ["wind"]}}}, "sweep=wind: no such option"),
-    ({"runs": {}}, "runs: expected a number of runs for one of paper, quick, smoke"),
-    ({"runs": {"smoke": 0}}, "runs.smoke: expected"),
-    ({"runs": {"quick": 1}}, "budget: expected one that small has runs for, quick, got 'smoke'"),
-    ({"runs": {"large": 1}}, "runs: expected one of paper, quick, smoke, got 'large'"),
-    ({"claims": "two"}, "claims: unknown key"),
-]
-
-
-def test_a_key_that_comes_twice_is_refused_instead_of_dropped(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = write(tmp_path)
-    path.write_text(path.read_text() + "claim: another\n")
-    assert sweep(tmp_path) == 2
-    assert "the key 'claim' comes twice" in capsys.readouterr().err
-
-
 def test_sections_within_sections_mean_the_same_as_dotted_names(tmp_path: Path) -> None:
-    dotted = plan_jobs(
-        read_experiment(
-            str(
-                write(
-                    tmp_path,
-                    settings={"task": "hunting", "task.p_m": 0.1},
-                    conditions={"calm": {"label": "calm", "settings": {"task.p_e": 0.2, "noise.sensor_std": 0.1}}},
-                )
-            )
-        ),
-        "smoke",
-    )
-    nested = plan_jobs(
-        read_experiment(
-            str(
-                write(
-                    tmp_path,
-                    settings={"task": "hunting", "task.p_m": 0.1},
-                    conditions={
-                        "calm": {"label": "calm", "settings": {"task": {"p_e": 0.2}, "noise": {"sensor_std": 0.1}}}
-                    },
-                )
-            )
-        ),
-        "smoke",
-    )
-    assert [job.settings for job in nested] == [job.settings for job in dotted]
+    def planned(**settings: object) -> list[RunSettings]:
+        write(tmp_path, settings={"task": "hunting"}, conditions={"calm": {"label": "calm", "settings": settings}})
+        return [job.settings for job in plan(tmp_path)]
+
+    dotted = planned(**{"task.p_m": 0.1, "task.p_e": 0.2, "noise.sensor_std": 0.1})
+    assert planned(task={"p_m": 0.1, "p_e": 0.2}, noise={"sensor_std": 0.1}) == dotted
+
+
+def test_words_with_special_characters_arrive_as_they_are_written(tmp_path: Path) -> None:
+    one = {"label": "NEAT", "settings": {"evolution.activation_default": "a [b], 'c' ~{d}"}}
+    write(tmp_path, variants={"one": one})
+    with pytest.raises(ExneatError, match=re.escape("""got "a [b], 'c' ~{d}\"""")):
+        plan(tmp_path)
 
 
 def test_damage_in_one_run_leaves_the_others_finished_and_is_named(
@@ -234,8 +170,8 @@ def test_damage_in_one_run_leaves_the_others_finished_and_is_named(
 
 
 def test_a_directory_that_a_killed_job_had_only_just_made_is_no_obstacle(tmp_path: Path) -> None:
-    path = write(tmp_path, **TWO_JOBS)
-    for job in plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])[:2]:
+    write(tmp_path, **TWO_JOBS)
+    for job in plan(tmp_path)[:2]:
         job.settings.directory.path.mkdir(parents=True)
     assert sweep(tmp_path) == 0
 
@@ -252,8 +188,8 @@ def test_figures_that_are_missing_are_drawn_by_the_next_call(tmp_path: Path) -> 
 
 def test_side_by_side_a_failure_is_named_with_its_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
-    path = write(tmp_path, **TWO_JOBS)
-    jobs = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])
+    write(tmp_path, **TWO_JOBS)
+    jobs = plan(tmp_path)
     spoilt = jobs[1].settings.directory.path
     spoilt.parent.mkdir(parents=True)
     spoilt.write_text("in the way")
@@ -263,52 +199,64 @@ def test_side_by_side_a_failure_is_named_with_its_reason(tmp_path: Path, capsys:
     assert f"  {jobs[1].name}: {spoilt}: expected a directory, got a file" in shown.err
 
 
-@pytest.mark.parametrize(("changes", "named"), BAD_FILES, ids=[named for _, named in BAD_FILES])
+def variant(**entries: object) -> dict[str, object]:
+    return {"variants": {"neat": {"label": "NEAT", "settings": {}, **entries}}}
+
+
+def condition(**entries: object) -> dict[str, object]:
+    return {"conditions": {"a": {"label": "a", "settings": {}, **entries}}}
+
+
+NONSENSE = [
+    ({"variants": {}}, "variants: expected at least one entry"),
+    ({"conditions": {}}, "conditions: expected at least one entry"),
+    ({"variants": ["neat"]}, "variants: expected a section with keys of its own, got ['neat']"),
+    ({"variants": {"neat": {"label": "NEAT"}}}, "variants.neat.settings: is missing"),
+    ({"variants": {"neat": "NEAT"}}, "variants.neat: expected a section"),
+    (variant(settings=[1]), "variants.neat.settings: expected a section"),
+    (variant(label=[1]), "variants.neat.label: expected text, got [1]"),
+    (variant(swept="no"), "variants.neat.swept: expected true or false, got 'no'"),
+    (variant(setings={}), "did you mean variants.neat.settings?"),
+    ({"variants": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),
+    (variant(settings={"seed": 3}), "variants.neat.settings.seed: expected another setting"),
+    (variant(settings={"++seed": 3}), "variants.neat.settings.++seed: expected another"),
+    ({"settings": {"output": "elsewhere"}}, "settings.output: expected another setting"),
+    ({"settings": {"sweep": {"levels": [1]}}}, "settings.sweep.levels: expected another setting"),
+    ({"settings": {"hydra.job.name": "x"}}, "settings.hydra.job.name: expected another setting"),
+    (variant(settings={"algorithm": {"name": "nead"}}), "algorithm: expected one of"),
+    (variant(runs=0), "variants.neat.runs: expected"),
+    (variant(runs=True), "variants.neat.runs: expected"),
+    (variant(settings={"algorithm": "nead"}), "algorithm=nead: no such option"),
+    (variant(settings={"sed": 3}), "small, clean, neat: sed: unknown key (value 3)\n  did you mean seed?"),
+    ({"variants": {k: {"label": k, "settings": {}} for k in "ab"}}, "clean/a/0 and clean/b/0 are the same run"),
+    (condition(settings={"task.gap": 99}), "small, a, exneat: task.gap: expected"),
+    (condition(settings={"task.gap": datetime.date(2020, 1, 1)}), "task.gap: expected"),
+    (condition(sweeps="gap"), "conditions.a.sweeps: expected a list of names of sweeps, got 'gap'"),
+    (condition(sweeps=[1]), "conditions.a.sweeps: expected a list of names of sweeps"),
+    (condition(sweeps=["p_m"]), "fits task=track_maze"),
+    (condition(sweeps=["wind"]), "sweep=wind: no such option"),
+    ({"runs": {}}, "runs: expected at least one entry"),
+    ({"runs": {"smoke": 0}}, "runs.smoke: expected"),
+    ({"runs": {"quick": 1}}, "budget: expected one that small has runs for, quick, got 'smoke'"),
+    ({"runs": {"large": 1}}, "runs: expected one of paper, quick, smoke, got 'large'"),
+    ({"claim": 3}, "claim: expected text, got 3"),
+    ({"claims": "two"}, "claims: unknown key (value 'two')\n  did you mean claim?"),
+    ({"name": "mine"}, "name: unknown key"),
+]
+
+
+@pytest.mark.parametrize(("changes", "named"), NONSENSE, ids=[named for _, named in NONSENSE])
 def test_an_experiment_that_makes_no_sense_is_refused_before_anything_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, object], named: str
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], changes: dict[str, object], named: str
 ) -> None:
-    write(tmp_path, **changes)
-    assert sweep(tmp_path) == 2
-    message = capsys.readouterr().err
-    assert named in message
-    assert len(message.strip().splitlines()) <= 3
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        ([], "experiment: expected a name or a YAML file"),
-        (["experiment=chess"], "experiment: expected one of ant, foraging"),
-        (["experiment=ant", "seed=0,1"], "a sweep runs seeds of its own"),
-        (["experiment=ant", "noise=5"], "noise: expected the name of an option, got 5"),
-        (["experiment=ant", "=5"], "=5: unknown flag"),
-        (["experiment=nowhere.yaml"], "could not be read"),
-        (["experiment=ant", "budget=huge"], "budget: expected one that ant has runs for"),
-        (["experiment=ant", "sed=3"], "sed: unknown key"),
-        (["experiment=ant", "--fast"], "--fast: unknown flag"),
-        (["experiment=ant", "generations=0"], "generations: expected"),
-    ],
-)
-def test_a_command_line_that_makes_no_sense_is_refused_before_anything_runs(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    named: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["sweep", *arguments]) == 2
-    message = capsys.readouterr().err
-    assert named in message
-    assert len(message.strip().splitlines()) <= 3
-    assert not list(tmp_path.iterdir())
+    path = write(tmp_path, **changes)
+    check_refusal(["sweep", f"experiment={path}", "budget=smoke", "output=out"], [named], tmp_path, capfd)
 
 
 def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_path: Path) -> None:
-    path = write(tmp_path, **TWO_JOBS)
+    write(tmp_path, **TWO_JOBS)
     assert sweep(tmp_path) == 0
-    job = plan_jobs(read_experiment(str(path)), "smoke", [f"output={tmp_path / 'out'}"])[0]
+    job = plan(tmp_path)[0]
     assert job.is_finished()
     manifest = job.settings.directory.manifest
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "status": "running"}))

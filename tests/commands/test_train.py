@@ -7,17 +7,23 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+import traceback
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
-from exneat_cli.commands.composition import configuration_directory
-from exneat_cli.main import main
+import exneat_cli
+from exneat_cli.commands.command_line import read_command_line, shipped_directory
+from exneat_cli.commands.jobs import read_job
+from exneat_cli.main import COMMANDS, main
 from exneat_cli.records import RunDirectory
 from exneat_cli.runs import RunSettings
-from exneat_cli.tasks import TASKS
+from exneat_cli.tasks import ENDED, TASKS, Simulation, TrackMaze
 
 
 def train(*arguments: str) -> int:
@@ -177,28 +183,6 @@ def test_a_damaged_run_does_not_hide_the_others_from_the_list(
     assert states == ["damaged", "damaged", "done"]
 
 
-@pytest.mark.parametrize("damage", ["genomes", "actuators", "scores", "plan"])
-def test_a_champion_whose_parts_do_not_fit_is_refused(
-    damage: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    assert train(f"output={tmp_path}", "geometry=all") == 0
-    path = the_run(tmp_path) / "champion.json"
-    champion = json.loads(path.read_text())
-    if damage == "plan":
-        champion["plan"]["modules"][0]["pins"][0]["index"] = 10**13
-    else:
-        champion[damage] = type(champion[damage])()
-    path.write_text(json.dumps(champion))
-    capfd.readouterr()
-    assert main(["inspect", f"run={the_run(tmp_path)}"]) == 2
-    assert "champion.json: damaged" in capfd.readouterr().err
-
-
-def test_every_command_explains_itself(capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", "--help"]) == 0
-    assert capfd.readouterr().out.startswith("usage: exneat inspect")
-
-
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
     tmp_path: Path, number: signal.Signals, code: int
@@ -222,22 +206,9 @@ def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
     assert json.loads((the_run(tmp_path) / "manifest.json").read_text())["status"] == "interrupted"
 
 
-def composed(*arguments: str) -> RunSettings:
-    done = subprocess.run(
-        [Path(sys.executable).parent / "exneat", "train", "--cfg", "job", "--resolve", *arguments],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    plain = yaml.safe_load(done.stdout)
-    for key in ("budget", "budgets", "sweep", "sweeps"):
-        del plain[key]
-    return RunSettings.from_plain(plain)
-
-
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
-    from_files = composed(f"task={task}").to_plain()
+    from_files = read_job("", read_command_line("train", [f"task={task}"]).compose()).settings.to_plain()
     from_python = RunSettings(task=TASKS[task](), name=task).to_plain()
     budget = ("generations", "population", "episodes", "validation_episodes", "test_episodes")
     for plain in (from_files, from_python) if task != "ant" else ():
@@ -248,7 +219,7 @@ def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
 
 def test_every_key_in_conf_carries_a_comment() -> None:
     bare = []
-    for path in sorted(configuration_directory().rglob("*.yaml")):
+    for path in sorted(shipped_directory("conf").rglob("*.yaml")):
         explained_above = path.parent.name in ("algorithm", "geometry", "linkage", "budget", "sweep")
         for line in path.read_text(encoding="utf-8").splitlines():
             is_value = ":" in line and not line.rstrip().endswith(":") and not line.lstrip().startswith(("#", "-"))
@@ -257,13 +228,87 @@ def test_every_key_in_conf_carries_a_comment() -> None:
     assert not bare
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], []])
-def test_help_and_version_import_nothing_heavy(arguments: list[str]) -> None:
+LIBRARIES = ("pandas", "matplotlib", "numba", "mujoco", "gymnasium", "numpy")
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_imports_nothing_heavy_and_shows_every_setting_with_its_meaning(command: str) -> None:
+    heavy = LIBRARIES if command else (*LIBRARIES, "hydra", "yaml")
     code = (
         "import sys\n"
         "from exneat_cli.main import main\n"
-        f"assert main({arguments!r} or None if {arguments!r} else ['--help']) == 0\n"
-        "heavy = {'pandas', 'matplotlib', 'numba', 'mujoco', 'gymnasium', 'hydra', 'numpy'} & set(sys.modules)\n"
-        "assert not heavy, heavy"
+        f"assert main([*{command.split()}, '--help']) == 0\n"
+        f"assert not set({heavy}) & set(sys.modules), set({heavy}) & set(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    if command:
+        assert done.stdout.startswith(f"# exneat {command}: ")
+        for line in shown_settings(command):
+            assert line in done.stdout
+    else:
+        assert all(f"\n  {name} " in done.stdout for name in COMMANDS)
+
+
+def shown_settings(command: str) -> list[str]:
+    """Lines that the help of a command must hold."""
+    lines = {
+        "train": [
+            "seed: 0 ",
+            "task=ant\n",
+            "  max_steps: 1000 ",
+            "neat_hidden: 6 ",
+            "  sensor_std: 0.0 ",
+            "sweep: none ",
+        ],
+        "sweep": ["experiment: null ", "seed: 0 ", "  max_steps: 1000 "],
+        "report": ["only: null ", "axis: generation "],
+        "evaluate": ["run: null ", "  episodes: 100 ", "  workers: 0 "],
+        "inspect": ["run: null ", "output: outputs "],
+        "doctor": ["output: outputs "],
+    }
+    return lines[command]
+
+
+def test_a_configuration_is_shown_without_training(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["train", "--cfg", "job", "task=hunting", "seed=4"]) == 0
+    shown = yaml.safe_load(capfd.readouterr().out)
+    assert (shown["task"]["p_m"], shown["seed"], shown["generations"]) == (0.5, 4, 10)
+    assert not list(tmp_path.iterdir())
+
+
+def test_few_frames_of_our_own_lie_between_the_command_line_and_the_compiled_loop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deepest = 0
+    submitting = 0
+
+    def own_frames() -> int:
+        package = str(Path(exneat_cli.__file__).parent)
+        return sum(frame.filename.startswith(package) for frame in traceback.extract_stack())
+
+    def submit(pool: ThreadPoolExecutor, *arguments: Any, **options: Any) -> Any:
+        nonlocal submitting
+        submitting = own_frames()
+        return real_submit(pool, *arguments, **options)
+
+    def reset(world: Any, rng: Any) -> None:
+        nonlocal deepest
+        of_the_thread = 0 if threading.current_thread() is threading.main_thread() else submitting
+        deepest = max(deepest, own_frames() - 1 + of_the_thread)  # the loop itself is compiled otherwise
+
+    def do_nothing(*arguments: Any) -> int:
+        return ENDED
+
+    def opened(task: TrackMaze, *, training: bool) -> Simulation:
+        return Simulation(None, reset, do_nothing, do_nothing, do_nothing, compiled=False)
+
+    real_submit = ThreadPoolExecutor.submit
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", submit)
+    monkeypatch.setattr(TrackMaze, "open", opened)
+    monkeypatch.setattr("exneat_cli.runs.run.choose_champion", lambda *arguments: sys.exit("trained"))
+    with pytest.raises(SystemExit, match="trained"):
+        main(["train", "task=track_maze", "budget=smoke", "executor=serial", f"output={tmp_path}"])
+    assert 1 + deepest <= 10, "program, main and all that follow"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -17,13 +17,13 @@ from exneat_cli.algorithms import (
     ALGORITHMS,
     Algorithm,
     Candidate,
+    ExNEAT,
     Problem,
     Results,
     Search,
     State,
     Team,
     Trials,
-    initial_genomes,
     pack_teams,
     unpack_teams,
 )
@@ -126,18 +126,9 @@ class Draws(Search):
 
     def ask(self) -> Trials:
         if not self.second:
-            self.teams = [self._drawn(k) for k in range(self.problem.population)]
+            anew = replace(self.problem, seed=self.problem.seed + 1 + self.generation)
+            self.teams = list(ExNEAT().start(anew).ask().teams)
         return Trials(self.teams, self.problem.episodes)
-
-    def _drawn(self, number: int) -> Team:
-        key = self.generation * self.problem.population + number + 1
-        genomes = []
-        for index, shape in enumerate(self.problem.plan.subpopulation_shapes):
-            rng = np.random.default_rng((self.problem.seed, key, index))
-            (genome,) = initial_genomes(self.problem.evolution, shape, 1, rng)
-            genome.key = key
-            genomes.append(genome)
-        return Team(tuple(genomes), (key,) * len(genomes))
 
     def tell(self, results: Results) -> bool:
         fitness = np.where(results.failed, -np.inf, results.fitness.mean(axis=1))

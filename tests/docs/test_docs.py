@@ -6,13 +6,17 @@ import dataclasses
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from exneat_cli.records.champion import Champion, Connection, Node, Scores
 from exneat_cli.records.history import COLUMNS
+from exneat_cli.records.manifest import Manifest, Result, Score
 from exneat_cli.records.robustness import RobustnessRow
 from exneat_cli.runs import RunSettings
 from exneat_cli.tasks import TASKS, AntTask
+from exneat_cli.wiring import Module, Pin, Plan
 
 ROOT = Path(__file__).parents[2]
 PAGES = [path for path in ROOT.glob("docs/**/*.md") if "_build" not in path.parts]
@@ -66,6 +70,23 @@ def test_every_column_and_term_is_in_the_manual() -> None:
     terms = [name for task in TASKS.values() for name in (*task().terms, *task().trace_columns)]
     terms = [re.sub(r"^prey_\d+", "prey_<k>", name) for name in terms]
     assert not [name for name in (*COLUMNS, *RobustnessRow._fields, *terms) if f"`{name}`" not in page]
+
+
+@pytest.mark.parametrize(
+    ("page", "kinds"),
+    [
+        ("docs/run-directory.md", [Manifest, Result, Score]),
+        ("docs/champion.md", [Champion, Scores, Node, Connection, Plan, Module, Pin]),
+    ],
+)
+def test_every_field_of_a_file_is_in_the_manual(page: str, kinds: list[Any]) -> None:
+    text = text_of(page)
+    names = [
+        name
+        for kind in kinds
+        for name in getattr(kind, "__struct_encode_fields__", None) or [each.name for each in dataclasses.fields(kind)]
+    ]
+    assert not [name for name in names if f"`{name}`" not in text]
 
 
 def test_the_tables_of_ant_say_who_senses_and_drives_what() -> None:

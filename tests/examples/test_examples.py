@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import importlib.util
 import json
-import runpy
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,14 @@ def in_an_empty_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
         registry.update(entries)
 
 
-def load(example: str) -> dict[str, Any]:
-    return runpy.run_path(str(EXAMPLES / example))
+def load(example: str) -> Any:
+    name = example.removesuffix(".py")
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / example)
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def history_of(run: Path) -> list[dict[str, str]]:
@@ -77,7 +84,7 @@ def test_a_champion_acts_in_numpy_as_it_does_in_our_brains(name: str) -> None:
     champion = read_champion(file)
     brains = lay_out([champion.brain()])
     memory, ours = np.zeros(memory_size(brains)), np.zeros(champion.plan.action_size)
-    stranger = load("run_champion.py")["Champion"](json.loads(file.read_text(encoding="utf-8")))
+    stranger = load("run_champion.py").Champion(json.loads(file.read_text(encoding="utf-8")))
     actions = []
     for sensed in np.random.default_rng(5).standard_normal((50, champion.plan.observation_size)):
         memory[: len(sensed)] = sensed
@@ -90,7 +97,7 @@ def test_a_champion_acts_in_numpy_as_it_does_in_our_brains(name: str) -> None:
 
 def test_a_champion_of_ant_walks_in_gymnasiums_environment_without_exneat() -> None:
     champion = train(CHAMPIONS["NEAT on Ant"]).directory.champion
-    walk = load("run_champion.py")["walk"]
+    walk = load("run_champion.py").walk
     assert walk(champion, steps=20) == walk(champion, steps=20) != 0.0
 
 
@@ -124,8 +131,8 @@ def test_what_an_example_adds_trains_is_tested_and_resumes_to_the_same_history(
 
 
 def test_the_lamp_of_the_corridor_is_found() -> None:
-    finished = train(RunSettings(task=load("custom_task.py")["Corridor"](), generations=5, population=30, episodes=5))
-    assert finished.result["champion"]["fitness_mean"] == 1.0
+    finished = train(RunSettings(task=load("custom_task.py").Corridor(), generations=5, population=30, episodes=5))
+    assert finished.result.champion.fitness_mean == 1.0
 
 
 def test_the_experiment_of_ones_own_is_swept_and_reported() -> None:

@@ -17,15 +17,7 @@ from exneat_cli.algorithms import Candidate, Team
 from exneat_cli.brains import Brain
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import (
-    Champion,
-    Genome,
-    Score,
-    Scores,
-    read_champion,
-    write_hall_of_fame,
-    write_json,
-)
+from exneat_cli.records import Champion, Genome, Score, Scores, read_champion, write_hall_of_fame, write_json
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.tasks import AntTask

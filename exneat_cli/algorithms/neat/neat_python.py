@@ -26,7 +26,6 @@ import neat.genome
 import neat.reproduction
 from neat.reporting import ReporterSet
 from neat.species import DefaultSpeciesSet, Species
-from numpy.random import Generator
 
 from exneat_cli.algorithms.neat.genome import ArrayGenome
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
@@ -190,22 +189,6 @@ def machinery(config: neat.Config) -> tuple[SteadyReproduction, DefaultSpeciesSe
     species_set = DefaultSpeciesSet(config.species_set_config, reporters)
     species_set.indexer = counter(1)
     return SteadyReproduction(config.reproduction_config, reporters, stagnation), species_set
-
-
-def initial_genomes(
-    settings: EvolutionSettings, shape: tuple[int, int, int], number: int, rng: Generator
-) -> list[ArrayGenome]:
-    """Genomes of a first generation, for algorithms that do not evolve them; their ids are 1, 2, ...
-
-    Args:
-        settings: say which connections and weights they have; `genome` is passed over.
-        shape: numbers of inputs, initial hidden nodes and outputs.
-        number: how many.
-        rng: of all draws.
-    """
-    config = neat_config(settings, number, shape)
-    config.genome_config.generator = rng
-    return list(machinery(config)[0].create_new(ArrayGenome, config.genome_config, number).values())
 
 
 def state_of(config: neat.Config, reproduction: SteadyReproduction, species_set: DefaultSpeciesSet) -> dict[str, Any]:

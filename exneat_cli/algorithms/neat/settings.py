@@ -13,11 +13,7 @@ INITIAL_CONNECTIONS = ("full_nodirect", "full_direct", "unconnected", "fs_neat_n
 """neat-python's names; ``fs_neat`` connects one input (Whiteson et al., "Automatic feature selection in
 neuroevolution", 2005)."""
 
-_CHOICES = {
-    "genome": ("array", "stock"),
-    "activation_default": ACTIVATIONS,
-    "initial_connection": INITIAL_CONNECTIONS,
-}
+_CHOICES = {"genome": ("array", "stock"), "activation_default": ACTIVATIONS, "initial_connection": INITIAL_CONNECTIONS}
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
 _SHARES = ("_rate", "_prob", "survival_threshold")
 """Endings of the names of what is a probability; other real numbers are only not negative."""

@@ -67,11 +67,7 @@ def reset(maze: Maze, rng: Generator) -> None:
     goal = int(rng.integers(0, 4))
     start = (goal + 1 + int(rng.integers(0, 3))) % 4
     far = size - 3  # from one corner to the next
-    begin(
-        maze,
-        start=(1 + start // 2 * far, 1 + start % 2 * far),
-        goal=(1 + goal // 2 * far, 1 + goal % 2 * far),
-    )
+    begin(maze, start=(1 + start // 2 * far, 1 + start % 2 * far), goal=(1 + goal // 2 * far, 1 + goal % 2 * far))
     furthest = maze.goal[FURTHEST]
     maze.signals[:] = 0.0
     for row in range(size):

@@ -1,4 +1,4 @@
-"""Which figures of a run are drawn, and when."""
+"""One run as the commands do it: which figures are drawn, and when."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from exneat_cli.commands.drawing import draw_what_is_missing, missing_figures
+from exneat_cli.commands.jobs import draw_what_is_missing, missing_figures
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 
