@@ -126,7 +126,7 @@ class ArrayGenome:
         chosen = int(rng.integers(pins + self.nodes.size - outputs))
         source = -1 - chosen if chosen < pins else int(self.nodes["key"][outputs + chosen - pins])
         row = row_of(self.connections, target, source)
-        if self.connections[row : row + 1][["target", "source"]].tolist() == [(target, source)]:
+        if row < self.connections.size and self.connections[row].item()[:2] == (target, source):
             return  # they are connected already
         if config.feed_forward and would_close_a_cycle(self.nodes, self.connections, target, source):
             return
