@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta, Struct
 
 from exneat_cli.records.plain import Count, Real, Word
 
 MANIFEST_FORMAT = 3
-RUNNING, DONE, FAILED, INTERRUPTED = "running", "done", "failed", "interrupted"
+RUNNING: Final = "running"
+DONE: Final = "done"
+FAILED: Final = "failed"
+INTERRUPTED: Final = "interrupted"
 
 
 class Score(Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,7 +75,7 @@ class Manifest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, om
     """
 
     format: int
-    status: Annotated[str, Meta(pattern=f"^({RUNNING}|{DONE}|{FAILED}|{INTERRUPTED})\\Z")]
+    status: Literal["running", "done", "failed", "interrupted"]
     process: Count = 0
     variant: Word
     task: Word

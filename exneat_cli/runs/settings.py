@@ -151,12 +151,3 @@ def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _P
     section = check_section(key, values)
     check_choice(key, section.get("name"), list(registry))
     return build(registry[section["name"]], section, f"{key}.")
-
-
-def executor_from(plain: object) -> Executor:
-    """An executor from plain data.
-
-    Raises:
-        ConfigError: a key is unknown, or a value has the wrong type or range.
-    """
-    return build(Executor, plain, "executor.")
