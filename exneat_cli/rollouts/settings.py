@@ -36,11 +36,7 @@ class Executor:
 
     def __post_init__(self) -> None:
         check_choice("executor.name", self.name, EXECUTORS)
-        check_whole("executor.workers", self.workers, 0, 4096)
-        if self.name == "serial" and self.workers > 1:
-            raise ConfigError(
-                "executor.workers", "0 or 1 with executor=serial", self.workers, "executor=threads has more"
-            )
+        check_whole("executor.workers", self.workers, 0, 1 if self.name == "serial" else 4096)
         if self.address is None:
             return
         if self.name != "dask":
