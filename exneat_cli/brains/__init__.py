@@ -2,5 +2,4 @@
 
 from exneat_cli.brains.assembly import assemble, assemble_all
 from exneat_cli.brains.brain import Brains
-from exneat_cli.brains.brain import Brains as Brain  # one brain is the case of several that are one
 from exneat_cli.brains.rules import RandomActions, acting_by_rule, linear_fusion, motionless

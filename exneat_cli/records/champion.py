@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 from exneat_cli.algorithms import ACTIVATIONS, ArrayGenome, Candidate
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
 from exneat_cli.algorithms.neat.soundness import check_genes, check_genome
-from exneat_cli.brains import Brain, assemble
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
 from exneat_cli.records.files import write_whole
 from exneat_cli.records.manifest import Score
@@ -109,7 +109,7 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     plan: Plan
     genomes: tuple[Genome, ...]
 
-    def brain(self) -> Brain:
+    def brain(self) -> Brains:
         """The runnable network."""
         return assemble(self.plan, [genome.in_arrays() for genome in self.genomes], feed_forward=self.feed_forward)
 

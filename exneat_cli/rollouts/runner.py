@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from exneat_cli.brains import Brain, Brains, RandomActions, motionless
+from exneat_cli.brains import Brains, RandomActions, motionless
 from exneat_cli.brains.brain import lay_out
 from exneat_cli.rollouts.cluster import cluster_of, keep_clusters
 from exneat_cli.rollouts.episode import Acting, World
@@ -23,7 +23,7 @@ from exneat_cli.rollouts.sharing import shares_for_threads, short_shares
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
 
-Actors = Brains | Sequence[Brain] | RandomActions
+Actors = Brains | Sequence[Brains] | RandomActions
 
 
 class Runner:
@@ -82,9 +82,9 @@ class Runner:
             cluster_of(self._executor).run((self._task, self._noise, self._training), acting, episodes, tally)
         return tally.outcomes(self._task)
 
-    def trace(self, brain: Brain | RandomActions, seeds: EpisodeSeeds) -> Trace:
+    def trace(self, brain: Brains | RandomActions, seeds: EpisodeSeeds) -> Trace:
         """The path of one episode, and the world that it went through; always runs in this process."""
-        acting = self._acting([brain] if isinstance(brain, Brain) else brain)
+        acting = self._acting(brain)
         tally = Tally.empty(self._task, 1, 1, moments=False)
         path = np.zeros((self._task.longest_episode + 1, len(self._task.trace_columns) + len(self._task.terms)))
         self._worlds[0].run([(0, 0, 1)], acting, [seeds], tally, path)

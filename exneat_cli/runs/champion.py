@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from exneat_cli.algorithms import Team
-from exneat_cli.brains import Brain, acting_by_rule, assemble, motionless
+from exneat_cli.brains import Brains, acting_by_rule, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import (
     UNPERTURBED,
@@ -72,7 +72,7 @@ def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
     acting = acting_by_rule(settings.algorithm.rule, settings.task)
     episodes = unseen_episodes(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_all(runner.run([acting] if isinstance(acting, Brain) else acting, episodes))
+        (tested,) = score_all(runner.run(acting, episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
         trace = runner.trace(acting, episodes[0])
     _write_trace(settings, directory, trace)
@@ -80,11 +80,11 @@ def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
     return Result(champion=tested, standing_still=standing)
 
 
-def _compile(settings: RunSettings, team: Team) -> Brain:
+def _compile(settings: RunSettings, team: Team) -> Brains:
     return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
 
 
-def _standing_still(settings: RunSettings) -> Brain:
+def _standing_still(settings: RunSettings) -> Brains:
     return motionless(settings.task.sensed_size, settings.task.resting_action)
 
 

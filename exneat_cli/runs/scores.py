@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain
+from exneat_cli.brains import Brains
 from exneat_cli.records import Result, RobustnessRow, Score
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
@@ -33,7 +33,7 @@ def _score(fitness: NDArray[np.float64], full_reward: NDArray[np.float64], faile
     )
 
 
-def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes: int) -> list[Score]:
+def score_brains(runner: Runner, brains: Sequence[Brains], purpose: str, episodes: int) -> list[Score]:
     """Scores of several brains on the same ``"validation"`` or ``"test"`` episodes, side by side."""
     return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
 

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, Brains, RandomActions
+from exneat_cli.brains import Brains, RandomActions
 from exneat_cli.compiling import compiled
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
@@ -57,7 +57,7 @@ class WatchedRunner(Runner):
 
     def run(
         self,
-        brains: Brains | Sequence[Brain] | RandomActions,
+        brains: Brains | Sequence[Brains] | RandomActions,
         episodes: Sequence[EpisodeSeeds],
         *,
         moments: bool = False,

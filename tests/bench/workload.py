@@ -9,7 +9,7 @@ import numpy as np
 
 from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, neat_config
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.brains import Brain, assemble
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import AntTask
@@ -46,7 +46,7 @@ class Workload(NamedTuple):
         """The same, a genome each."""
         return [self._replace(genomes=[genome]) for genome in self.genomes]
 
-    def brains(self) -> list[Brain]:
+    def brains(self) -> list[Brains]:
         """The genomes compiled."""
         return [assemble(PLAN, [genome], feed_forward=SETTINGS.feed_forward) for genome in self.genomes]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.algorithms import Problem
-from exneat_cli.brains import Brain, RandomActions, assemble, linear_fusion, motionless
+from exneat_cli.brains import Brains, RandomActions, assemble, linear_fusion, motionless
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
@@ -43,7 +43,7 @@ def live(task: Task, simulation: Simulation) -> list[list[float]]:
 
 
 def run(
-    task: Task, acting: list[Brain] | RandomActions, episodes: list[EpisodeSeeds], std: float, training: bool
+    task: Task, acting: list[Brains] | RandomActions, episodes: list[EpisodeSeeds], std: float, training: bool
 ) -> Outcomes:
     with Runner(task, Noise(std), Executor("serial"), training=training) as runner:
         return runner.run(acting, episodes)
@@ -54,7 +54,7 @@ def rows(outcomes: Outcomes, brains: slice = slice(None)) -> list[Any]:
     return [values[brains].tolist() for values in outcomes[:4]]
 
 
-def quite_different_brains(task: Task) -> list[Brain]:
+def quite_different_brains(task: Task) -> list[Brains]:
     """Random networks, one that follows all it senses, one that fails at once, and one that does nothing."""
     settings = RunSettings(task=task, algorithm="neat", population=4)  # type: ignore[arg-type]
     problem = Problem(settings.plan, settings.evolution, 4, 1, "rank", seed=4)

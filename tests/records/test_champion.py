@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from exneat_cli.algorithms import Candidate, Team
-from exneat_cli.brains import Brain
+from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import Champion, Genome, Score, Scores, read_champion, write_hall_of_fame, write_json
@@ -75,7 +75,7 @@ def read(folder: Path, content: object) -> Champion:
     return read_champion(path)
 
 
-def check_sizes(brain: Brain) -> None:
+def check_sizes(brain: Brains) -> None:
     """Every index that compiled code follows stays within the value vector."""
     nodes, edges = len(brain.node_slot), len(brain.edge_source)
     assert len(brain.edge_start) == nodes + 1

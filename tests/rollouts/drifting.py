@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from exneat_cli.brains import Brain
+from exneat_cli.brains import Brains
 from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.compiling import compiled_lean
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
@@ -75,7 +75,7 @@ class Drifting(Task):
         return Simulation(np.zeros(3), **(COMPILED if self.compiled else PLAIN), compiled=self.compiled)
 
 
-def random_brains(count: int, task: Task | None = None) -> list[Brain]:
+def random_brains(count: int, task: Task | None = None) -> list[Brains]:
     """Weighted sums of what is sensed, all different, for `Drifting` or another task."""
     task, rng = task or Drifting(), np.random.default_rng(7)
     shape = len(task.actuator_names), task.sensed_size

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, RandomActions, motionless
+from exneat_cli.brains import Brains, RandomActions, motionless
 from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.compiling import compiled_lean
 from exneat_cli.rollouts import Executor, Noise, Runner
@@ -21,7 +21,7 @@ from tests.rollouts.drifting import EPISODES, PLAIN, SERIAL, Drifting, assert_eq
 EXPLODING = weighted_sums(np.full((1, 3), math.nan), np.zeros(1))
 
 
-def by_hand(brain: Brain, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def by_hand(brain: Brains, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The trace of episode k of `Drifting`, and what was sensed, in a few lines of NumPy."""
     world_rng, sensor_rng, action_rng = map(generator, EPISODES[k])
     rows, sensed = [(world_rng.uniform(-1.0, 1.0), 0.0)], []
@@ -88,7 +88,7 @@ def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(acting: A
     message = r"brains: expected sizes \(3, 1\) of observation and action, got \((2, 1|3, 2)\)"
     with Runner(Drifting(), Noise(), SERIAL, training=False) as runner:
         with pytest.raises(ValueError, match=message):
-            runner.run([acting] if isinstance(acting, Brain) else acting, EPISODES)
+            runner.run([acting] if isinstance(acting, Brains) else acting, EPISODES)
         with pytest.raises(ValueError, match=message):
             runner.trace(acting, EPISODES[0])
 
