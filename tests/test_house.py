@@ -22,6 +22,7 @@ FENCES = {
     "warp": {"tasks", "brains", "rollouts"},
     "neat": {"algorithms", "brains"},
     "matplotlib": {"analysis"},
+    "jinja2": {"analysis"},
     "dask": {"rollouts"},
     "distributed": {"rollouts"},
 }
