@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -14,10 +13,9 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brain, Brains, RandomActions
 from exneat_cli.compiling import compiled
-from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import evolve
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import AntTask, Simulation
 from exneat_cli.tasks.robots.dynamics import AntWorld, rewind
@@ -157,23 +155,18 @@ def compare_with_physics(variant: str) -> Row:
     Raises:
         VerificationError: an episode done again was another one.
     """
-    settings, threads = replace(VARIANTS[variant], generations=1 + GENERATIONS), usable_cores()
+    settings, threads = VARIANTS[variant], usable_cores()
     walls, ratios, episodes = [], [], []
     with (
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
         BarePhysics(settings, threads) as physics,
     ):
-        began = time.perf_counter()
-
-        def after_ours(history: Sequence[HistoryRow]) -> None:
-            nonlocal began
-            walls.append(time.perf_counter() - began)
+        training = Training.start(settings)
+        for _ in range(1 + GENERATIONS):
+            walls.append(seconds_of(partial(training.advance, runner)))
             episodes.append(runner.seconds)
             ratios.append(walls[-1] / physics.seconds(runner))
-            began = time.perf_counter()
-
-        history = evolve(settings, runner, after_ours).history
-    steps = history[-1]["env_steps"] - history[0]["env_steps"]
+    steps = training.history[-1]["env_steps"] - training.history[0]["env_steps"]
     note = (
         f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
         f"{np.median(episodes[1:]):.3f} s of it episodes"

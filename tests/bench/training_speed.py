@@ -9,10 +9,9 @@ from dataclasses import replace
 from exneat_cli.algorithms import EvolutionSettings, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
-from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import evolve
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import stream, training_episodes
 from tests.bench.generation_cost import WatchedRunner
 from tests.bench.measurement import RATIO, Bar, Row, VerificationError
@@ -49,7 +48,9 @@ def compare_with_neat_python(*, full: bool) -> Row:
         WatchedRunner(settings.task, settings.noise, Executor("threads", cores), training=True) as runner,
     ):
         theirs.warm_up()
-        evolve(replace(settings, generations=2, population=10), runner, lambda history: None)  # compiles
+        small = Training.start(replace(settings, population=10))
+        for _ in range(2):
+            small.advance(runner)  # compiles
         _check_episodes(theirs, runner)
         ours, reference = _take_turns(settings, runner, theirs)
     ratios = [(a.steps / a.seconds) / (b.steps / b.seconds) for a, b in zip(ours, reference, strict=True)]
@@ -64,15 +65,13 @@ def _take_turns(
     ours: list[Generation] = []
     reference: list[Generation] = []
     began = time.perf_counter()
-
-    def after_ours(history: Sequence[HistoryRow]) -> None:
-        nonlocal began
+    training = Training.start(settings)
+    while not training.is_over:
+        training.advance(runner)
         seconds = time.perf_counter() - began
         ours.append(Generation(int(runner.outcomes.steps.sum()), seconds, runner.seconds))
         reference.append(theirs.advance())
         began = time.perf_counter()
-
-    evolve(settings, runner, after_ours)
     return ours, reference
 
 

@@ -10,6 +10,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -23,7 +24,6 @@ from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Noise, Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train, training
 from exneat_cli.tasks import TASKS, AntTask, Simulation
-from exneat_cli.tasks.robots import ant_gymnasium
 from exneat_cli.wiring import Geometry
 from tests.torture.findings import Finding, Mistakes, exactly
 from tests.torture.small_runs import difference, results
@@ -103,41 +103,36 @@ def _poisoned(brains: Brains, chosen: list[int], chance: random.Random) -> Brain
 
 
 def _with_physics(seed: int, mistakes: Mistakes) -> int:
-    """Let Gymnasium's Ant leap in some training episodes."""
+    """Let Ant leap in some training episodes, which run in plain Python."""
     ordered: list[int] = [0]
     settings = RunSettings(task=AntTask(max_steps=40, patience=20), seed=seed, executor=Executor("serial"), **_SMALL)
-    with mock.patch.object(AntTask, "open", _leaping(random.Random(seed), ordered)), _empty_directory() as folder:
+    leaping = _leaping(AntTask.open_disturbed, random.Random(seed), ordered)
+    with mock.patch.object(AntTask, "open_disturbed", leaping), _empty_directory() as folder:
         run = train(replace(settings, output=str(folder / "out"))).directory
         _look_at("ant, physics", run, folder, ordered[0], mistakes)
     return ordered[0]
 
 
-def _leaping(chance: random.Random, ordered: list[int]) -> Callable[..., Simulation]:
+def _leaping(open_calm: Callable[..., Simulation], chance: random.Random, ordered: list[int]) -> Callable[..., Any]:
     """Opens worlds in which the body is given an impossible speed, in a third of the training episodes."""
     speeds = (np.nan, np.inf, 1e300, 1e12)
 
     def open_world(task: AntTask, *, training: bool, reset_scale: float) -> Simulation:
-        world = ant_gymnasium.GymnasiumAnt(task.max_steps, task.progress, task.patience, reset_noise_scale=reset_scale)
-        leaps = [0]
+        calm = open_calm(task, training=training, reset_scale=reset_scale)
+        leaps = [False]
 
-        def start(world: ant_gymnasium.GymnasiumAnt, begin: Callable[[], None]) -> None:
-            begin()
+        def start(begin: Callable[..., None], *arguments: Any) -> None:
+            begin(*arguments)
             leaps[0] = training and chance.random() < 1 / 3
             ordered[0] += leaps[0]
 
-        def step(world: ant_gymnasium.GymnasiumAnt, action: Any, terms: Any) -> int:
+        def step(world: Any, action: Any, terms: Any) -> int:
             if leaps[0]:
-                world.env.unwrapped.data.qvel[chance.randrange(14)] = chance.choice(speeds)  # type: ignore[attr-defined]
-            return ant_gymnasium.step(world, action, terms)
+                world.qvel[chance.randrange(14)] = chance.choice(speeds)
+            return int(calm.step(world, action, terms))
 
-        return Simulation.of(
-            ant_gymnasium,
-            world,
-            compiled=False,
-            reset=lambda world, rng: start(world, lambda: ant_gymnasium.reset(world, rng)),
-            rewind=lambda world: start(world, lambda: ant_gymnasium.rewind(world)),
-            step=step,
-        )
+        starts = {"reset": partial(start, calm.reset), "rewind": partial(start, calm.rewind)}
+        return replace(calm, **starts, step=step, compiled=False)
 
     return open_world
 
