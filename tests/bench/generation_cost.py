@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -156,19 +155,18 @@ def compare_with_physics(variant: str) -> Row:
     Raises:
         VerificationError: an episode done again was another one.
     """
-    settings, threads = replace(VARIANTS[variant], generations=1 + GENERATIONS), usable_cores()
+    settings, threads = VARIANTS[variant], usable_cores()
     walls, ratios, episodes = [], [], []
     with (
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
         BarePhysics(settings, threads) as physics,
     ):
         training = Training.start(settings)
-        while not training.is_over:
+        for _ in range(1 + GENERATIONS):
             walls.append(seconds_of(partial(training.advance, runner)))
             episodes.append(runner.seconds)
             ratios.append(walls[-1] / physics.seconds(runner))
-    history = training.history
-    steps = history[-1]["env_steps"] - history[0]["env_steps"]
+    steps = training.history[-1]["env_steps"] - training.history[0]["env_steps"]
     note = (
         f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
         f"{np.median(episodes[1:]):.3f} s of it episodes"

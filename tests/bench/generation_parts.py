@@ -104,11 +104,11 @@ def _seconds_by_part(settings: RunSettings) -> list[dict[str, float]]:
         clock.timing(training, "assemble_all", BRAINS),
         clock.timing(Runner, "run", EPISODES),
     ):
-        advancing = training.Training.start(settings)
-        while not advancing.is_over:
-            advancing.advance(runner)
+        evolving = training.Training.start(settings)
+        while not evolving.is_over:
+            evolving.advance(runner)
             with clock.counting(RECORDS):
-                write_history(Path(folder) / "history.csv", advancing.history)
-                write_checkpoint(Path(folder), advancing.checkpoint(), settings.full_hash)
+                write_history(Path(folder) / "history.csv", evolving.history)
+                write_checkpoint(Path(folder), evolving.checkpoint(), settings.full_hash)
             generations.append(clock.take())
     return generations

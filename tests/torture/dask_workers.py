@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
@@ -40,13 +40,17 @@ class Killed:
     seconds_undisturbed: float
 
 
+@dataclass
 class _Killer(Progress):
     """Kills one worker in every generation, at a moment drawn at random, until it has killed enough."""
 
-    def __init__(self, times: int, rng: random.Random) -> None:
+    times: int
+    rng: random.Random
+    kills: int = 0
+    threads: list[threading.Thread] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
         super().__init__()
-        self.times, self.rng, self.kills = times, rng, 0
-        self.threads: list[threading.Thread] = []
 
     def generation(self, row: HistoryRow) -> None:
         if len(self.threads) < self.times:

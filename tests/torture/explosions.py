@@ -103,39 +103,37 @@ def _poisoned(brains: Brains, chosen: list[int], chance: random.Random) -> Brain
 
 
 def _with_physics(seed: int, mistakes: Mistakes) -> int:
-    """Let Ant leap in some training episodes."""
+    """Let Ant leap in some training episodes, which run in plain Python."""
     ordered: list[int] = [0]
     settings = RunSettings(task=AntTask(max_steps=40, patience=20), seed=seed, executor=Executor("serial"), **_SMALL)
-    with (
-        mock.patch.object(AntTask, "open_disturbed", _leaping(random.Random(seed), ordered)),
-        _empty_directory() as folder,
-    ):
+    leaping = _leaping(AntTask.open_disturbed, random.Random(seed), ordered)
+    with mock.patch.object(AntTask, "open_disturbed", leaping), _empty_directory() as folder:
         run = train(replace(settings, output=str(folder / "out"))).directory
         _look_at("ant, physics", run, folder, ordered[0], mistakes)
     return ordered[0]
 
 
-def _leaping(chance: random.Random, ordered: list[int]) -> Callable[..., Simulation]:
+def _leaping(open_calm: Callable[..., Simulation], chance: random.Random, ordered: list[int]) -> Callable[..., Any]:
     """Opens worlds in which the body is given an impossible speed, in a third of the training episodes."""
     speeds = (np.nan, np.inf, 1e300, 1e12)
 
     def open_world(task: AntTask, *, training: bool, reset_scale: float) -> Simulation:
-        calm, leaps = opened(task, training=training, reset_scale=reset_scale), [0]
+        calm = open_calm(task, training=training, reset_scale=reset_scale)
+        leaps = [False]
 
-        def start(begin: Callable[..., Any], *arguments: Any) -> None:
+        def start(begin: Callable[..., None], *arguments: Any) -> None:
             begin(*arguments)
             leaps[0] = training and chance.random() < 1 / 3
             ordered[0] += leaps[0]
 
-        def step(world: Any, action: Any, terms: Any) -> Any:
+        def step(world: Any, action: Any, terms: Any) -> int:
             if leaps[0]:
                 world.qvel[chance.randrange(14)] = chance.choice(speeds)
-            return calm.step(world, action, terms)
+            return int(calm.step(world, action, terms))
 
-        reset, rewind = partial(start, calm.reset), partial(start, calm.rewind)
-        return replace(calm, compiled=False, reset=reset, rewind=rewind, step=step)
+        starts = {"reset": partial(start, calm.reset), "rewind": partial(start, calm.rewind)}
+        return replace(calm, **starts, step=step, compiled=False)
 
-    opened = AntTask.open_disturbed
     return open_world
 
 
