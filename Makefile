@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ant test check tests format reproduce report bench equivalence torture wheel clean
+.PHONY: help ant test check tests docs format reproduce report bench equivalence torture wheel clean
 
 # Reports take the largest budget that has runs unless BUDGET is given.
 OF_BUDGET := $(if $(BUDGET),budget=$(BUDGET))
@@ -25,7 +25,7 @@ $(VENV)/installed: pyproject.toml
 ant: $(VENV)/installed ## train ExNEAT on Ant (a few minutes) and say what was learned
 	@$(BIN)/exneat train task=ant geometry=all budget=quick generations=40 resume=true
 
-test: check tests ## checks and tests
+test: check docs tests ## checks, manual and tests
 
 check: $(VENV)/installed ## style, imports and types
 	$(BIN)/ruff check
@@ -34,6 +34,9 @@ check: $(VENV)/installed ## style, imports and types
 
 tests: $(VENV)/installed ## tests alone
 	$(BIN)/pytest
+
+docs: $(VENV)/installed ## build the manual into docs/_build/html; a warning is an error
+	$(BIN)/sphinx-build -q -W --keep-going -n -b html docs docs/_build/html
 
 format: $(VENV)/installed ## bring the code into shape
 	$(BIN)/ruff check --fix
@@ -68,4 +71,4 @@ wheel: $(VENV)/installed ## build the wheel into dist/
 	$(BIN)/python -m build --wheel
 
 clean: ## remove what was built, but no runs
-	rm -rf $(VENV) dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) dist build docs/_build .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -2,15 +2,16 @@
 
 numba's own cache forgets a function only when the file that holds it changes; a compiled episode,
 however, carries everything that it calls. So the cache directory is named after the contents of
-every file that is compiled together.
+every file of ours that is compiled together, and functions that call code from elsewhere, such as a
+user's task, are compiled anew in each process.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
-import threading
 import types
 from collections.abc import Callable
 from importlib.metadata import version
@@ -18,15 +19,15 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import config
+from numba.core import config
+from numba.core.caching import FunctionCache
 
 _COMPILED_ROOMS = ("tasks", "algorithms", "brains", "rollouts")
-_CACHE_SET_UP = threading.Lock()
 
 
 @functools.cache
 def source_digest() -> str:
-    """Hexadecimal digest of all files that are compiled together, and of NumPy's version."""
+    """Hexadecimal digest of all files of ours that are compiled together, and of NumPy's version."""
     package = Path(__file__).parent
     digest = hashlib.sha256(version("numpy").encode())
     for room in _COMPILED_ROOMS:
@@ -75,26 +76,44 @@ def compiled_lean(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    dispatcher: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     directory = cache_directory()
-    with _CACHE_SET_UP:
-        return _compiled_into(directory, function, options)
+    if directory is not None and _is_all_ours(function):
+        # numba has no argument for the place of a cache; this is its NUMBA_CACHE_DIR, and it stays for the process.
+        config.CACHE_DIR = str(directory)
+        with contextlib.suppress(RuntimeError):  # nothing can be written, although there is such a directory
+            cache = _Cache(function)
+            # On a full disk numba turns to another place, whose name tells nothing of what was compiled.
+            if directory in Path(cache.cache_path).parents:
+                dispatcher._cache = cache
+    return dispatcher  # type: ignore[no-any-return]
 
 
-def _compiled_into(directory: Path | None, function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
-    before = config.CACHE_DIR  # type: ignore[attr-defined]
-    config.CACHE_DIR = "" if directory is None else str(directory)  # type: ignore[attr-defined]
-    try:
+def _is_all_ours(function: Callable[..., Any]) -> bool:
+    """Whether the function, and every compiled one that it calls, stands in a file that names the cache directory."""
+    named: list[Any] = [function.__globals__.get(name) for name in function.__code__.co_names]
+    ours = function.__module__.partition(".")[0] == __name__.partition(".")[0]
+    return ours and all(_is_all_ours(other.py_func) for other in named if hasattr(other, "py_func"))
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, but a damaged file or a full disk costs no more than the time to compile."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What is cached for a signature, or None."""
         try:
-            return _decorated(function, options, cache=directory is not None)
-        except RuntimeError:  # numba tries to write there; a full disk must cost time only
-            return _decorated(function, options, cache=False)
-    finally:
-        config.CACHE_DIR = before  # type: ignore[attr-defined]
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling a file that was cut short raises all kinds of errors
+            try:
+                self.flush()
+            except OSError:
+                self.disable()
+            return None
 
-
-def _decorated(function: Callable[..., Any], options: dict[str, Any], *, cache: bool) -> Callable[..., Any]:
-    decorate: Callable[..., Callable[..., Any]] = numba.njit(nogil=True, cache=cache, error_model="numpy", **options)
-    return decorate(function)
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Cache what was compiled for a signature."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
 
 
 def with_functions(template: Callable[..., Any], name: str, **functions: Callable[..., Any]) -> types.FunctionType:

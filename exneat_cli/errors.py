@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import reprlib
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -40,32 +39,12 @@ class ConfigError(ExneatError):
 
 
 def shortened(value: object) -> str:
-    """A value in Python's words, cut to what fits on a line or two.
-
-    A value that came through YAML aliases may be a few bytes on disk and gigabytes in words.
-    """
+    """A value in Python's words, cut to what fits on a line or two."""
     try:
-        text = _Words().repr(value)
+        text = repr(value)
     except ValueError:  # an integer of thousands of digits has no words
         text = f"a value of type {type(value).__name__} with thousands of digits"
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
-
-
-class _Words(reprlib.Repr):
-    """Names a list's or section's first entries alone."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxstring = self.maxother = self.maxlong = _LONGEST_VALUE
-        self.maxlist = self.maxtuple = self.maxdict = 20
-        self.maxlevel = 3
-
-    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
-        """In the order given, where `reprlib` would sort, which fails on keys of several types."""
-        if level <= 0 or not x:
-            return "{...}" if x else "{}"
-        parts = [f"{self.repr1(key, 0)}: {self.repr1(x[key], level - 1)}" for key in list(x)[: self.maxdict]]
-        return "{" + ", ".join([*parts, "..."] if len(x) > self.maxdict else parts) + "}"
 
 
 def check_whole(key: str, value: object, low: int, high: int | None = None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import importlib
 import os
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import heeding, listening, stop_listening, tell_how_to_go_on
+from exneat_cli.interruption import listening, signal_heard
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -23,6 +24,7 @@ COMMANDS = {
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
+_RESUMABLE = "exneat: interrupted; run the same command again to resume (a single exneat train also needs resume=true)"
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
 
@@ -50,7 +52,8 @@ usage: exneat <command> [key=value ...]
 def program() -> int:
     """What the installed program calls: as `main`, but a late signal changes nothing any more."""
     code = main()
-    stop_listening()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -76,33 +79,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     with listening():
         try:
-            with heeding():
-                if command not in COMMANDS:
-                    raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
-                line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
-                if line.shown:
-                    print(line.show())
-                    return 0
-                code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(line)
-                return code
-        except KeyboardInterrupt as interrupt:
-            tell_how_to_go_on()
-            return 128 + getattr(interrupt, "number", signal.SIGINT)
-        except ExneatError as error:
-            return _refuse(str(error))
-        except ImportError as error:
-            return _refuse(f"{error}\n  python -m pip check says which libraries are missing or of another version")
-        except BrokenPipeError:
-            return 0
-        except OSError as error:
-            if error.errno not in _NO_ROOM:
-                raise
-            where = error.filename or "temporary files or the program's own output"
-            return _refuse(f"{where}: {error.strerror}; check the disk, output= and TMPDIR")
+            if command not in COMMANDS:
+                raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
+            line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
+            if line.shown:
+                print(line.show())
+                return 0
+            code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(line)
+            return code
+        except (Exception, KeyboardInterrupt) as error:
+            return _ended_by(error)
 
 
-def _refuse(message: str) -> int:
-    """Print the message, and return the exit code; what a stranger wrote must not steer the terminal."""
+def _ended_by(error: BaseException) -> int:
+    """Say what ended a command, where that is no fault of the program's; returns the exit code."""
+    if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
+        with contextlib.suppress(OSError, ValueError):  # nobody reads
+            print(_RESUMABLE, file=sys.stderr, flush=True)
+        return 128 + (signal_heard() or signal.SIGINT)
+    if isinstance(error, BrokenPipeError):
+        return 0
+    if isinstance(error, ExneatError):
+        message = str(error)
+    elif isinstance(error, ImportError):
+        message = f"{error}\n  python -m pip check says which libraries are missing or of another version"
+    elif isinstance(error, OSError) and error.errno in _NO_ROOM:
+        where = error.filename or "temporary files or the program's own output"
+        message = f"{where}: {error.strerror}; check the disk, output= and TMPDIR"
+    else:
+        raise error
+    # What a stranger wrote must not steer the terminal.
     printable = "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in message)
     print(f"exneat: {printable}", file=sys.stderr)
     return 2

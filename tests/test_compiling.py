@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
 from exneat_cli.compiling import cache_directory, compiled, compiled_lean, with_functions
+from exneat_cli.tasks.grid.maze import measure_distances
 
 
 def double(x: float) -> float:
@@ -54,42 +54,65 @@ def test_lean_code_that_allocates_is_refused_by_the_compiler() -> None:
         compiled_lean(lambda size: np.zeros(size))(3)
 
 
-def in_new_process(code: str, cache: Path) -> str:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
-    return done.stdout.strip()
-
-
-def test_a_second_process_finds_compiled_code_in_the_cache(tmp_path: Path) -> None:
-    code = (
-        "import numpy as np\n"
-        "from exneat_cli.brains.brain import activate, lay_out, memory_size\n"
-        "from exneat_cli.brains import motionless\n"
-        "brains = lay_out([motionless(3, np.zeros(2))])\n"
-        "activate(brains, 0, np.zeros(memory_size(brains)), np.zeros(2))\n"
-        "print(sum(activate.stats.cache_hits.values()), sum(activate.stats.cache_misses.values()))"
-    )
-    assert in_new_process(code, tmp_path) == "0 1"
-    assert in_new_process(code, tmp_path) == "1 0"
-
-
-def test_an_unusable_cache_directory_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    blocked = tmp_path / "file"
-    blocked.touch()
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty cache of this test's own."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(numba.core.config, "CACHE_DIR", numba.core.config.CACHE_DIR)
     cache_directory.cache_clear()
-    try:
-        assert cache_directory() is None
-        assert compiled(double)(4.0) == 8.0
-    finally:
-        cache_directory.cache_clear()
+    yield tmp_path
+    cache_directory.cache_clear()
 
 
-def test_a_full_disk_under_the_cache_costs_only_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+def measure() -> str:
+    """Compile a function of the package anew and use it: hits and misses of the cache, or why there is none."""
+    compiled_here: Any = compiled(measure_distances.py_func)  # type: ignore[attr-defined]
+    distances = np.zeros((5, 5), np.int64)
+    assert compiled_here(np.eye(5, dtype=np.int64), (1, 1), distances) == 0
+    stats = compiled_here.stats
+    return f"{sum(stats.cache_hits.values())} {sum(stats.cache_misses.values())}" if stats.cache_path else "uncached"
+
+
+@pytest.mark.parametrize("damaged", ["nothing", "*.nbi", "*.nbc"])
+def test_compiled_code_is_found_again_and_a_damaged_file_is_replaced(cache: Path, damaged: str) -> None:
+    assert measure() == "0 1"
+    assert measure() == "1 0"
+    for file in cache.rglob(damaged):
+        file.write_bytes(file.read_bytes()[:20] if damaged == "*.nbc" else b"")
+        assert measure() == "0 1"
+        assert measure() == "1 0"
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.parametrize("place", ["tempfile.TemporaryFile", "numba.core.caching.IndexDataCacheFile._open_for_write"])
+def test_a_full_disk_under_the_cache_costs_only_the_cache(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*arguments: object, **options: object) -> object:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("tempfile.TemporaryFile", full)
-        doubling = compiled(double)
-    assert doubling(3.0) == 6.0
+        patch.setattr(place, full)
+        assert measure() in ("uncached", "0 1")
+    assert measure() == "0 1"
+
+
+def test_an_unusable_cache_directory_means_no_cache(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (cache / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(cache / "file"))
+    assert cache_directory() is None
+    assert measure() == "uncached"
+
+
+@pytest.mark.usefixtures("cache")
+def test_code_that_calls_code_from_elsewhere_is_compiled_anew_in_each_process() -> None:
+    # The cache would find it by its name, whatever became of the other code since.
+    def cached(**functions: Any) -> bool:
+        copy = with_functions(template, "copy", **functions)
+        copy.__module__ = "exneat_cli.rollouts.episode"
+        compiled_copy: Any = compiled(copy)
+        return compiled_copy.stats.cache_path is not None
+
+    foreign = with_functions(template, "foreign", inner=compiled(double))
+    foreign.__module__ = "exneat_cli.rollouts.episode"
+    assert cached(inner=measure_distances)
+    assert not cached(inner=compiled(double))
+    assert not cached(inner=compiled(foreign))

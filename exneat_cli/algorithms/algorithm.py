@@ -17,11 +17,9 @@ from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_modules
 
 
 class Team(NamedTuple):
-    """One genome from each subpopulation, evaluated together.
+    """Genomes that are evaluated together, one from each subpopulation in their order.
 
-    Attributes:
-        genomes: in the order of the subpopulations.
-        ids: their ids; a team that meets the next generation intact keeps them.
+    A team that meets the next generation intact keeps its `ids`, those of its genomes.
     """
 
     genomes: tuple[ArrayGenome, ...]
@@ -29,13 +27,7 @@ class Team(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """A team that may become the champion.
-
-    Attributes:
-        team: the genomes.
-        fitness: what it was judged by in training.
-        generation: when, counted from 0.
-    """
+    """A team that may become the champion, its fitness in training and its generation, counted from 0."""
 
     team: Team
     fitness: float
@@ -43,12 +35,7 @@ class Candidate(NamedTuple):
 
 
 class Trials(NamedTuple):
-    """What an algorithm asks for.
-
-    Attributes:
-        teams: whose fitness it wants to know.
-        episodes: how many each of them gets, the same ones for all.
-    """
+    """What an algorithm asks for: teams, and how many episodes each of them gets, the same ones for all."""
 
     teams: Sequence[Team]
     episodes: int
@@ -91,12 +78,7 @@ class Problem:
 
 
 class State(NamedTuple):
-    """A search between two generations, as data.
-
-    Attributes:
-        plain: numbers, strings, lists and dicts.
-        arrays: columns of numbers by name.
-    """
+    """A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
 
     plain: dict[str, Any]
     arrays: dict[str, NDArray[Any]]
@@ -167,11 +149,7 @@ class Algorithm(ABC):
         raise TypeError(f"{self.name} trains nothing")
 
     def restored(self, problem: Problem, state: State) -> Search:
-        """The search that `state` was taken of.
-
-        Args:
-            problem: as it was.
-            state: from `Search.state`, or from a file of anyone's.
+        """The search of this `problem` that `state` was taken of: from `Search.state`, or from a file of anyone's.
 
         Raises:
             ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is none, or does not fit.

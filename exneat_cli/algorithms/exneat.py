@@ -13,17 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import neat
 import numpy as np
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team, Trials
-from exneat_cli.algorithms.hall_of_fame import HallOfFame
-from exneat_cli.algorithms.neat.packing import columns_of, pack, unpack
-from exneat_cli.algorithms.neat.settings import EvolutionSettings, neat_config
+from exneat_cli.algorithms.neat.neat_python import neat_config
+from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.algorithms.teams import pack_teams, unpack_teams
+from exneat_cli.algorithms.teams import pack_teams, unpack_teams, with_candidate
 from exneat_cli.errors import check_choice
 from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
@@ -34,77 +31,53 @@ PAIRINGS = ("rank", "index")
 ``index`` pairs in neat-python's own order."""
 
 
-@dataclass(frozen=True)
-class ExNEAT(Algorithm):
-    """Settings of ExNEAT beside those of its genomes, see `EvolutionSettings`."""
-
-    name: str = "exneat"
-
-    def __post_init__(self) -> None:
-        check_choice("algorithm.name", self.name, ["exneat"])
-
-    def start(self, problem: Problem) -> Search:
-        """Begin with random genomes."""
-        return Coevolution(problem)
-
-    def restored(self, problem: Problem, state: State) -> Search:
-        """The co-evolution that `state` was taken of."""
-        return Coevolution.restored(problem, state)
-
-
-@dataclass(frozen=True)
-class NEAT(ExNEAT):
-    """Settings of NEAT: one network senses and drives everything."""
-
-    name: str = "neat"
-    modular = False
-
-    def __post_init__(self) -> None:
-        check_choice("algorithm.name", self.name, ["neat"])
-
-    def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
-        """One module, whatever the body."""
-        refuse_modules(self.name, geometry, linkage, wiring)
-        return plan_body(task, hidden=evolution.neat_hidden)
-
-
 class Coevolution(Search):
     """One NEAT subpopulation for each that the plan names, paired into teams.
 
     Args:
         problem: see there.
+        state: of the co-evolution that this one goes on from; None to begin with random genomes.
+
+    Raises:
+        ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the state is none, or does not fit.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self._begin(problem)
-        self._subpopulations = [
-            Subpopulation(config, stream(problem.seed, "evolution", index))
-            for index, config in enumerate(_configs(problem))
-        ]
-
-    def _begin(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, state: State | None = None) -> None:
         self._problem = problem
         self._pairing_rng = generator(stream(problem.seed, "pairing"))
-        self._rank: list[dict[int, int]] = [{} for _ in problem.plan.subpopulation_shapes]
-        self._teams: list[Team] | None = None
-        self._told: list[float] | None = None
-        self._generation = 0
-        self._extinctions = 0
-        self._hall_of_fame = HallOfFame()
+        self._teams: list[Team] = []
+        self._fitness: list[float] = []  # of the teams, as they compete; empty while they wait for it
+        self._generation = self._extinctions = 0
+        self._hall_of_fame: list[Candidate] = []
+        shapes = problem.plan.subpopulation_shapes
+        configs = [neat_config(problem.evolution, problem.population, shape) for shape in shapes]
+        if state is None:
+            seeds = [stream(problem.seed, "evolution", index) for index in range(len(shapes))]
+            self._subpopulations = [Subpopulation(*own) for own in zip(configs, seeds, strict=True)]
+        else:
+            self._subpopulations = [
+                Subpopulation.restored(config, State(own, state.arrays), f"current.{index}")
+                for index, (config, own) in enumerate(zip(configs, state.plain["subpopulations"], strict=True))
+            ]
+            self._restore(state)
 
     def ask(self) -> Trials:
         """The teams of the next generation; the first call gives the first one."""
-        if self._teams is not None and self._told is None:
+        if self._teams and not self._fitness:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
-        if self._told is not None:
-            self._advance()
-        orders = [self._order(index) for index in range(len(self._subpopulations))]
-        self._teams = [self._team(ids) for ids in zip(*orders, strict=True)]
+        ranked = [self._teams[k].ids for k in best_first(self._fitness)]
+        if self._fitness:
+            self._reproduce()
+        orders = [
+            self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
+            for index, subpopulation in enumerate(self._subpopulations)
+        ]
+        self._teams, self._fitness = [self._team(ids) for ids in zip(*orders, strict=True)], []
         return Trials(list(self._teams), self._problem.episodes)
 
     def tell(self, results: Results) -> bool:
         """Give every team its mean fitness; the generation is over then."""
-        if self._teams is None or self._told is not None:
+        if not self._teams or self._fitness:
             raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
         if len(results.fitness) != len(self._teams):
             raise ValueError(f"tell: expected {len(self._teams)} fitness values, got {len(results.fitness)}")
@@ -114,14 +87,40 @@ class Coevolution(Search):
                 raise ValueError(f"tell: expected finite fitness values, got {value!r} for team {index}")
         sound = np.flatnonzero(~results.failed).tolist()
         for k in sound:
-            self._hall_of_fame.add(Candidate(self._teams[k], fitness[k], self._generation))
-        self._told = failed_last(fitness, sound)
+            candidate = Candidate(self._teams[k], fitness[k], self._generation)
+            self._hall_of_fame = with_candidate(self._hall_of_fame, candidate)
+        self._fitness = failed_last(fitness, sound)
         self._generation += 1
         return True
 
+    def _reproduce(self) -> None:
+        """Replace the genomes of every subpopulation by the fitness of their teams."""
+        shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
+        self._extinctions = 0
+        for index, subpopulation in enumerate(self._subpopulations):
+            fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
+            self._extinctions += subpopulation.advance(fitness)
+
+    def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
+        """One subpopulation's genomes in the order of the teams that they join: survivors, then offspring shuffled.
+
+        Args:
+            ids: of the genomes there are now.
+            ranked: of those of the last generation, those of the best team first.
+        """
+        if self._problem.pairing == "index":
+            return ids
+        there, before = set(ids), set(ranked)
+        offspring = [key for key in ids if key not in before]
+        shuffled = [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
+        return [key for key in ranked if key in there] + shuffled
+
+    def _team(self, ids: tuple[int, ...]) -> Team:
+        return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
+
     def candidates(self) -> list[Candidate]:
-        """Teams within a tenth of the best fitness so far."""
-        return self._hall_of_fame.entries
+        """Teams within a tenth of the best fitness so far, see `with_candidate`."""
+        return list(self._hall_of_fame)
 
     def columns(self) -> dict[str, int | float]:
         """Species, summed over subpopulations, and how many of these were created anew for this generation."""
@@ -134,91 +133,70 @@ class Coevolution(Search):
         Raises:
             RuntimeError: the teams that were asked for were not told their fitness.
         """
-        if self._teams is None or self._told is None:
+        if not self._fitness:
             raise RuntimeError("state: expected ask() and tell(results) before it")
-        entries = self._hall_of_fame.entries
+        states = [each.state(f"current.{index}") for index, each in enumerate(self._subpopulations)]
         plain = {
-            "subpopulations": [subpopulation.state() for subpopulation in self._subpopulations],
+            "subpopulations": [own.plain for own in states],
             "pairing": dict(self._pairing_rng.bit_generator.state),
             "teams": [list(team.ids) for team in self._teams],
-            "fitness": self._told,
+            "fitness": self._fitness,
             "generation": self._generation,
-            "hall_of_fame": [[entry.fitness, entry.generation] for entry in entries],
+            "hall_of_fame": [[entry.fitness, entry.generation] for entry in self._hall_of_fame],
         }
-        arrays = pack_teams([entry.team for entry in entries], "hall_of_fame")
-        for index, subpopulation in enumerate(self._subpopulations):
-            columns = pack(list(subpopulation.genomes.values()))
-            arrays |= {f"current.{index}.{name}": column for name, column in columns.items()}
+        arrays = pack_teams([entry.team for entry in self._hall_of_fame], "hall_of_fame")
+        for own in states:
+            arrays |= own.arrays
         return State(plain, arrays)
 
-    @classmethod
-    def restored(cls, problem: Problem, state: State) -> Coevolution:
-        """The co-evolution that `state` was taken of; see `Algorithm.restored`."""
+    def _restore(self, state: State) -> None:
+        """Bring all but the subpopulations into the state that `state` gave."""
         plain = state.plain
-        search = cls.__new__(cls)
-        search._begin(problem)
-        search._subpopulations = [
-            Subpopulation.restored(
-                config, own, unpack(columns_of(state.arrays, f"current.{index}"), config.genome_type)
-            )
-            for index, (config, own) in enumerate(zip(_configs(problem), plain["subpopulations"], strict=True))
-        ]
-        search._pairing_rng = generator_in(plain["pairing"])
-        search._teams = [search._team(tuple(int(key) for key in ids)) for ids in plain["teams"]]
-        for index, subpopulation in enumerate(search._subpopulations):
-            if sorted(team.ids[index] for team in search._teams) != sorted(subpopulation.genomes):
-                raise ValueError("expected every genome in one team")
-        search._told = [float(value) for value in plain["fitness"]]
-        if len(search._told) != len(search._teams) or not all(map(math.isfinite, search._told)):
-            raise ValueError("expected a finite fitness of every team")
-        search._generation = int(plain["generation"])
-        teams = unpack_teams(state.arrays, "hall_of_fame", problem)
-        search._hall_of_fame = HallOfFame(
-            [
-                _candidate(team, values, search._generation)
-                for team, values in zip(teams, plain["hall_of_fame"], strict=True)
-            ]
-        )
-        return search
-
-    def _team(self, ids: tuple[int, ...]) -> Team:
-        return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
-
-    def _advance(self) -> None:
-        """Reproduce every subpopulation."""
-        assert self._teams is not None
-        assert self._told is not None
-        ranking = best_first(self._told)
-        shared = separate_ties(self._told) if len(self._subpopulations) > 1 else self._told
-        self._extinctions = 0
+        self._pairing_rng = generator_in(plain["pairing"])
+        self._teams = [self._team(tuple(int(key) for key in ids)) for ids in plain["teams"]]
         for index, subpopulation in enumerate(self._subpopulations):
-            self._rank[index] = {self._teams[team].ids[index]: rank for rank, team in enumerate(ranking)}
-            ids_to_fitness = {team.ids[index]: shared[i] for i, team in enumerate(self._teams)}
-            self._extinctions += subpopulation.advance(ids_to_fitness)
-        self._told = None
-
-    def _order(self, index: int) -> list[int]:
-        """Ids of a subpopulation's genomes in the order of the teams that they join."""
-        ids = list(self._subpopulations[index].genomes)
-        if self._problem.pairing == "index":
-            return ids
-        rank = self._rank[index]
-        survivors = sorted((key for key in ids if key in rank), key=lambda key: rank[key])
-        offspring = [key for key in ids if key not in rank]
-        return survivors + [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
+            if sorted(team.ids[index] for team in self._teams) != sorted(subpopulation.genomes):
+                raise ValueError("expected every genome in one team")
+        self._fitness = [float(value) for value in plain["fitness"]]
+        if len(self._fitness) != len(self._teams) or not all(map(math.isfinite, self._fitness)):
+            raise ValueError("expected a finite fitness of every team")
+        self._generation = int(plain["generation"])
+        teams = unpack_teams(state.arrays, "hall_of_fame", self._problem)
+        for team, (fitness, generation) in zip(teams, plain["hall_of_fame"], strict=True):
+            if not math.isfinite(fitness) or not 0 <= generation < self._generation:
+                raise ValueError(f"expected a finite fitness in a generation before now, got {fitness}, {generation}")
+            self._hall_of_fame.append(Candidate(team, float(fitness), int(generation)))
 
 
-def _configs(problem: Problem) -> list[neat.Config]:
-    """A neat-python configuration for each subpopulation: two must not share one."""
-    return [neat_config(problem.evolution, problem.population, shape) for shape in problem.plan.subpopulation_shapes]
+@dataclass(frozen=True)
+class ExNEAT(Algorithm):
+    """Settings of ExNEAT beside those of its genomes, see `EvolutionSettings`."""
+
+    name: str = "exneat"
+
+    def __post_init__(self) -> None:
+        check_choice("algorithm.name", self.name, [type(self).name])
+
+    def start(self, problem: Problem) -> Search:
+        """Begin with random genomes."""
+        return Coevolution(problem)
+
+    def restored(self, problem: Problem, state: State) -> Search:
+        """The co-evolution that `state` was taken of."""
+        return Coevolution(problem, state)
 
 
-def _candidate(team: Team, values: Sequence[Any], generations: int) -> Candidate:
-    fitness, generation = values
-    candidate = Candidate(team, float(fitness), int(generation))
-    if not math.isfinite(candidate.fitness) or not 0 <= candidate.generation < generations:
-        raise ValueError(f"expected a finite fitness in one of {generations} generations, got {candidate[1:]}")
-    return candidate
+@dataclass(frozen=True)
+class NEAT(ExNEAT):
+    """Settings of NEAT: one network senses and drives everything."""
+
+    name: str = "neat"
+    modular = False
+
+    def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
+        """One module, whatever the body."""
+        refuse_modules(self.name, geometry, linkage, wiring)
+        return plan_body(task, hidden=evolution.neat_hidden)
 
 
 def failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:

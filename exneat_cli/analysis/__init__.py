@@ -2,5 +2,3 @@
 
 from exneat_cli.analysis.network_graph import draw_network
 from exneat_cli.analysis.run_figures import draw_path, draw_robustness, draw_training
-
-__all__ = ["draw_network", "draw_path", "draw_robustness", "draw_training"]

@@ -1,32 +1,31 @@
-"""The catalogue of figures and tables: data, read from experiments/catalogue.yaml and checked."""
+"""The catalogue of figures and tables: what experiments/catalogue.yaml may say, and what comes of an entry."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import difflib
+import re
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, NamedTuple
 
-from exneat_cli.errors import ExneatError, check_choice
-from exneat_cli.records import read_yaml
+import msgspec
+
+from exneat_cli.errors import ExneatError, check_choice, check_section
+from exneat_cli.records import converted, read_yaml
 
 FIGURE_KINDS = ("training", "training_runs", "robustness", "cluster", "area", "network")
-QUANTITIES = ("training", "test", "efficiency", "robustness")
+QUANTITIES = ("training", "test", "full_reward", "efficiency", "robustness")
 VALUES = ("fitness", "full_reward")
-_Part = TypeVar("_Part")
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One set of axes of a figure.
 
     Attributes:
         experiment, condition: where its runs come from.
         sweep: name of the robustness sweep on the horizontal axis; needed by robustness and cluster.
-        value: ``fitness`` or ``full_reward``.
+        value: one of `VALUES`, on the vertical axis.
         highest: levels above it are left out.
-        variant: whose champion a network panel shows.
+        variant: whose champion a network panel shows; needed there.
     """
 
     experiment: str
@@ -40,34 +39,32 @@ class Panel:
         check_choice("value", self.value, VALUES)
 
 
-@dataclass(frozen=True)
-class FigurePlan:
-    """One figure.
+class FigurePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One figure: name (its files are called so), kind (of `FIGURE_KINDS`), title, and panels from left to right.
 
-    Attributes:
-        name: e.g. ``figure-4.3``; its files are called so.
-        kind: one of `FIGURE_KINDS`.
-        title: above the picture, and first in its caption.
-        panels: from left to right.
-        variants: the trained variants that it shows; empty for all.
+    Of the trained variants it shows those in `variants`; without any, all.
     """
 
     name: str
     kind: str
     title: str
-    panels: tuple[Panel, ...]
+    panels: Annotated[tuple[Panel, ...], msgspec.Meta(min_length=1)]
     variants: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        needed = {"robustness": "sweep", "cluster": "sweep", "network": "variant"}.get(self.kind)
+        if needed and any(getattr(panel, needed) is None for panel in self.panels):
+            raise ValueError(f"a panel of kind {self.kind} needs a {needed}")
 
-@dataclass(frozen=True)
-class Column:
+
+class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What one column of a table shows.
 
     Attributes:
-        of: ``training`` (final best so far), ``test`` (the champion on the test episodes), ``efficiency``
-            (first generation, from 1, at which the mean best so far reaches the final mean of the first
+        of: ``training`` (final best so far), ``test`` and ``full_reward`` (of the champion on the test episodes),
+            ``efficiency`` (first generation, from 1, at which the mean best so far reaches the final mean of the first
             variant), or ``robustness``.
-        sweep, level, value: which entry of the robustness sweeps.
+        sweep, level, value: of a robustness sweep, with one of `VALUES`; needed there alone.
     """
 
     of: str
@@ -78,82 +75,74 @@ class Column:
     def __post_init__(self) -> None:
         check_choice("of", self.of, QUANTITIES)
         check_choice("value", self.value, VALUES)
+        if self.of == "robustness" and (self.sweep is None or self.level is None):
+            raise ValueError("a column of robustness needs a sweep and a level")
 
 
-@dataclass(frozen=True)
-class TableRow:
+class TableRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One variant in one condition; `published` holds what the thesis prints, by column, numbers or e.g. ``>20``."""
 
     experiment: str
     condition: str
     variant: str
-    published: Mapping[str, float | str] = field(default_factory=dict)
+    published: dict[str, int | float | str] = {}
 
 
-@dataclass(frozen=True)
-class TablePlan:
-    """One table.
+class TablePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="table"):
+    """One table: name (its files are called so), title, columns by name, rows from top to bottom, and a note below."""
+
+    name: str
+    title: str
+    columns: Annotated[dict[str, Column], msgspec.Meta(min_length=1)]
+    rows: Annotated[tuple[TableRow, ...], msgspec.Meta(min_length=1)]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            for column in row.published:
+                check_choice("published", column, tuple(self.columns))
+
+
+class Built(NamedTuple):
+    """One figure or table that lies on disk.
 
     Attributes:
-        name: e.g. ``table-5.1``.
-        title: above it.
-        columns: name -> what it shows.
-        rows: from top to bottom.
-        note: a sentence below it, or nothing.
+        name, title, caption: what it is called, what it shows in a few words, and the sentences below it.
+        paths: its files.
+        header, rows: the cells of a table, as printed; empty for a figure.
     """
 
     name: str
     title: str
-    columns: Mapping[str, Column]
-    rows: tuple[TableRow, ...]
-    note: str = ""
+    caption: str
+    paths: tuple[Path, ...]
+    header: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
 
 
 def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:
-    """Every figure and table by name, in the order of the file.
+    """Read every figure and table, by name and in the order of the file.
 
     Raises:
         ExneatError: the file is missing, or an entry lacks something, has too much or makes no sense.
     """
-    artefacts: dict[str, FigurePlan | TablePlan] = {}
+    plans: dict[str, FigurePlan | TablePlan] = {}
     for name, entry in read_yaml(path).items():
         try:
-            artefacts[str(name)] = _artefact(str(name), dict(entry))
-        except (KeyError, TypeError, ValueError, ExneatError) as error:
-            raise ExneatError(f"{path}: {name}: {error}") from error
-    return artefacts
+            kind = check_section("entry", entry).get("kind")
+            check_choice("kind", kind, (*FIGURE_KINDS, "table"))
+            schema: type[FigurePlan | TablePlan] = TablePlan if kind == "table" else FigurePlan
+            plans[str(name)] = converted({**entry, "name": str(name)}, schema, "")
+        except ExneatError as error:
+            raise ExneatError(f"{path}: {name}: {error}{_nearest(str(error))}") from error
+    return plans
 
 
-def _artefact(name: str, entry: dict[str, Any]) -> FigurePlan | TablePlan:
-    kind = entry.pop("kind", None)
-    check_choice("kind", kind, (*FIGURE_KINDS, "table"))
-    if kind == "table":
-        columns = {str(key): _build(Column, value) for key, value in entry.pop("columns").items()}
-        rows = tuple(_build(TableRow, row) for row in entry.pop("rows"))
-        return _build(TablePlan, {"name": name, "columns": columns, "rows": rows, **entry})
-    panels = tuple(_panel(kind, panel) for panel in _some(entry.pop("panels")))
-    variants = tuple(entry.pop("variants", ()))
-    return _build(FigurePlan, {"name": name, "kind": kind, "panels": panels, "variants": variants, **entry})
-
-
-def _panel(kind: str, values: Mapping[str, Any]) -> Panel:
-    panel = _build(Panel, values)
-    if kind in ("robustness", "cluster") and panel.sweep is None:
-        raise ValueError(f"a panel of kind {kind} needs a sweep")
-    if kind == "network" and panel.variant is None:
-        raise ValueError("a panel of kind network needs a variant")
-    return panel
-
-
-def _some(panels: Sequence[Any]) -> Sequence[Any]:
-    if not panels:
-        raise ValueError("expected at least one panel")
-    return panels
-
-
-def _build(part: type[_Part], values: Mapping[str, Any]) -> _Part:
-    known = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
-    unknown = [key for key in values if key not in known]
-    if unknown:
-        raise ValueError(f"{unknown[0]}: unknown key; known here: {', '.join(known)}")
-    return part(**values)
+def _nearest(message: str) -> str:
+    """Of a message about an unknown key: what was probably meant."""
+    unknown = re.search(r"(?:(\w+)\[.*\]: )?object contains unknown field (.*)", message)
+    if not unknown:
+        return ""
+    part = {"panels": Panel, "columns": Column, "rows": TableRow}.get(unknown[1])
+    known = part.__struct_fields__ if part else {*FigurePlan.__struct_fields__, *TablePlan.__struct_fields__}
+    return f"; the nearest valid one is {difflib.get_close_matches(unknown[2], sorted(known), n=1, cutoff=0.0)[0]}"

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, plan_from_data, read_champion_data
+from exneat_cli.records import Champion, RunDirectory, read_champion
 from exneat_cli.wiring import Plan
 
 Node = tuple[int, int]
-"""Index of a module, and a node of its genome: outputs from 0, then hidden nodes; pin k is -1 - k."""
+"""A module, and a key in its genome: outputs from 0, then hidden nodes; input k is -1 - k."""
+SENSORS = -1
+"""In place of a module: the observation, whose entries are then the keys."""
 
 
 class Edge(NamedTuple):
-    """An enabled connection within a module."""
+    """An enabled connection within a module, between keys of its genome."""
 
-    source: Node
-    target: Node
+    source: int
+    target: int
     weight: float
 
 
 class Link(NamedTuple):
-    """A pin that reads a node of another module, at this step or delayed by one."""
+    """An input that reads a node of another module, at this step or delayed by one."""
 
     source: Node
     target: Node
@@ -38,8 +40,9 @@ class ChampionGraph:
         plan: who senses and drives what.
         actuators: names of the entries of the action.
         feed_forward: whether no connection runs back; else each takes a step.
-        hidden: hidden nodes of each module, initial and grown.
-        edges: connections of all modules; modules that share a genome repeat it.
+        inputs: of each module, what its inputs read.
+        hidden: of each module, its hidden nodes, initial and grown.
+        edges: of each module; modules that share a genome repeat it.
         links: between modules; those that would read a deleted node are left out.
         used: nodes on a path from a sensor to an output that drives an actuator, by way of any module.
         test_fitness: mean over the test episodes.
@@ -48,99 +51,68 @@ class ChampionGraph:
     plan: Plan
     actuators: tuple[str, ...]
     feed_forward: bool
+    inputs: tuple[tuple[Node, ...], ...]
     hidden: tuple[tuple[int, ...], ...]
-    edges: tuple[Edge, ...]
+    edges: tuple[tuple[Edge, ...], ...]
     links: tuple[Link, ...]
     used: frozenset[Node]
     test_fitness: float
 
+    def kind_of(self, source: Node) -> str:
+        """What an input reads: ``sensors``, or ``outputs`` or ``hidden`` nodes of a module."""
+        module, key = source
+        if module == SENSORS:
+            return "sensors"
+        return "outputs" if key < self.plan.modules[module].outputs else "hidden"
+
 
 def read_champion_graph(run: RunDirectory) -> ChampionGraph:
-    """The graph of a run's champion.
+    """Read the graph of a run's champion.
 
     Raises:
         ExneatError: the run has no champion, as baselines and unfinished runs have none, or its file is damaged.
     """
     if not run.champion.exists():
         raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
-    content = read_champion_data(run.champion)
-    try:
-        return champion_graph(content)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise ExneatError(f"{run.champion}: damaged: {type(error).__name__}: {error}") from error
+    return champion_graph(read_champion(run.champion))
 
 
-def champion_graph(content: dict[str, Any]) -> ChampionGraph:
-    """The graph of what champion.json holds.
-
-    Raises:
-        KeyError, TypeError, ValueError, IndexError: something is missing, of the wrong type, or points nowhere.
-    """
-    plan = plan_from_data(content["plan"])
-    plan.check()
-    actuators = tuple(str(name) for name in content["actuators"])
-    if len(actuators) != plan.action_size:
-        raise ValueError(f"names {len(actuators)} actuators for {plan.action_size}")
-    genomes = [content["genomes"][module.subpopulation] for module in plan.modules]
-    nodes = [[int(node["id"]) for node in genome["nodes"]] for genome in genomes]
-    known = {(m, n) for m, ids in enumerate(nodes) for n in ids}
-    edges = _edges(plan, genomes, known)
-    links = _links(plan, known)
+def champion_graph(champion: Champion) -> ChampionGraph:
+    """Make the graph of what champion.json holds."""
+    plan = champion.plan
+    genomes = [champion.genomes[module.subpopulation] for module in plan.modules]
+    nodes = [sorted(node.id for node in genome.nodes) for genome in genomes]
+    inputs = tuple(tuple((pin.module, pin.index) for pin in module.pins) for module in plan.modules)
+    edges = tuple(
+        tuple(Edge(gene.source, gene.target, gene.weight) for gene in genome.connections if gene.enabled)
+        for genome in genomes
+    )
+    links = tuple(
+        Link(source, (m, -1 - k), plan.modules[m].pins[k].delayed)
+        for m, own in enumerate(inputs)
+        for k, source in enumerate(own)
+        if source[0] != SENSORS and source[1] in nodes[source[0]]
+    )
+    sensing = {(m, -1 - k) for m, own in enumerate(inputs) for k, source in enumerate(own) if source[0] == SENSORS}
+    driving = {(m, output) for m, module in enumerate(plan.modules) for output in range(len(module.drives))}
+    steps = [((m, edge.source), (m, edge.target)) for m, own in enumerate(edges) for edge in own]
+    steps += [(link.source, link.target) for link in links]
+    back = [(target, source) for source, target in steps]
     return ChampionGraph(
         plan=plan,
-        actuators=actuators,
-        feed_forward=bool(content["feed_forward"]),
-        hidden=tuple(
-            tuple(sorted(n for n in ids if n >= module.outputs))
-            for ids, module in zip(nodes, plan.modules, strict=True)
-        ),
+        actuators=champion.actuators,
+        feed_forward=champion.feed_forward,
+        inputs=inputs,
+        hidden=tuple(tuple(keys[module.outputs :]) for keys, module in zip(nodes, plan.modules, strict=True)),
         edges=edges,
         links=links,
-        used=_used(plan, edges, links),
-        test_fitness=float(content["scores"]["test"]["fitness_mean"]),
+        used=frozenset(_reachable(sensing, steps) & _reachable(driving, back)),
+        test_fitness=champion.scores.test.fitness_mean,
     )
 
 
-def _edges(plan: Plan, genomes: list[dict[str, Any]], known: set[Node]) -> tuple[Edge, ...]:
-    sources = known | {(m, -1 - k) for m, module in enumerate(plan.modules) for k in range(len(module.pins))}
-    edges = [
-        Edge((m, int(gene["from"])), (m, int(gene["to"])), float(gene["weight"]))
-        for m, genome in enumerate(genomes)
-        for gene in genome["connections"]
-        if gene["enabled"]
-    ]
-    for edge in edges:
-        if edge.source not in sources or edge.target not in known:
-            raise ValueError(f"a connection between nodes that do not exist: {edge.source[1]} to {edge.target[1]}")
-    return tuple(edges)
-
-
-def _links(plan: Plan, known: set[Node]) -> tuple[Link, ...]:
-    links = []
-    for m, module in enumerate(plan.modules):
-        for k, pin in enumerate(module.pins):
-            if pin.is_sensor:
-                continue
-            links.append(Link((pin.module, pin.index), (m, -1 - k), pin.delayed))
-    return tuple(link for link in links if link.source in known)
-
-
-def _used(plan: Plan, edges: Iterable[Edge], links: Iterable[Link]) -> frozenset[Node]:
-    steps = [(edge.source, edge.target) for edge in edges] + [(link.source, link.target) for link in links]
-    sensors = [(m, -1 - k) for m, module in enumerate(plan.modules) for k, p in enumerate(module.pins) if p.is_sensor]
-    driving = [(m, output) for m, module in enumerate(plan.modules) for output in range(len(module.drives))]
-    return frozenset(_reachable(sensors, steps) & _reachable(driving, [(target, source) for source, target in steps]))
-
-
-def _reachable(starts: Iterable[Node], steps: Iterable[tuple[Node, Node]]) -> set[Node]:
-    following: dict[Node, list[Node]] = {}
-    for source, target in steps:
-        following.setdefault(source, []).append(target)
-    found = set(starts)
-    queue = list(found)
-    while queue:
-        for node in following.get(queue.pop(), []):
-            if node not in found:
-                found.add(node)
-                queue.append(node)
+def _reachable(starts: set[Node], steps: Collection[tuple[Node, Node]]) -> set[Node]:
+    found = starts
+    while new := {target for source, target in steps if source in found} - found:
+        found = found | new
     return found

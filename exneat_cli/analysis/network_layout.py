@@ -3,60 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
+from matplotlib.transforms import Bbox
 
-from exneat_cli.analysis.network_data import ChampionGraph, Node
-from exneat_cli.wiring import Module, Plan
+from exneat_cli.analysis.network_data import ChampionGraph, Edge
+from exneat_cli.wiring import Module
 
+Places = dict[int, tuple[float, float]]
+"""(x, y) of the inputs and nodes of one module, by key."""
+
+# Inches. Links run in the gap between boxes. What a box keeps free of nodes: at its top, above outputs that drive
+# something, at its bottom, at its sides.
 GAP = 0.3
-"""Between boxes; links run there."""
 TITLE, OUTPUT_NAMES, INPUT_NAMES, SIDE = 0.32, 0.2, 0.6, 0.2
-"""What a box keeps free of nodes: at its top, above outputs that drive something, at its bottom, at its sides."""
-LAYER = 0.55
-"""Least distance of layers."""
-PIN = 0.09
-"""Least distance of inputs."""
-ACTUATOR = 0.5
-"""Least distance of outputs that carry a name."""
-_CLEAR = 0.08
-"""Least distance of a node from connections that pass it."""
+# Least distances: of layers, of inputs, of outputs that carry a name, of a node from connections that pass it.
+LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
+
 _SHIFTS = (0.0, 0.15, -0.15, 0.3, -0.3)
 """By how much of the distance between its nodes a layer may move aside; the first is best among equals."""
 _SAME_ROW = 0.1
 """Modules whose distance is below this share of the body's length stand in one row."""
 
 
-@dataclass(frozen=True)
-class Box:
-    """A module's place; (x, y) is its lower left corner."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Everything that has a place.
-
-    Attributes:
-        width, height: of the page.
-        boxes: one per module.
-        places: (x, y) of every node and pin.
-    """
-
-    width: float
-    height: float
-    boxes: tuple[Box, ...]
-    places: dict[Node, tuple[float, float]]
-
-
 def page_direction(modules: Sequence[Module]) -> list[tuple[float, float]]:
-    """Where each module lies as one looks at the page: to the right, and up.
+    """Say where each module lies as one looks at the page: to the right, and up.
 
     A body looks up the page: x ahead is up, y to the left is left. The parts of a map, which are called
     up and down, keep the map's x and y.
@@ -68,76 +40,58 @@ def page_direction(modules: Sequence[Module]) -> list[tuple[float, float]]:
 
 def natural_size(graph: ChampionGraph) -> tuple[float, float]:
     """Width and height at which everything can be told apart, within what fits on a screen."""
-    rows = _rows(page_direction(graph.plan.modules))
+    modules = graph.plan.modules
+    rows = _rows(page_direction(modules))
     widest = max(len(row) for row in rows)
-    room = max(max(PIN * len(pin_slots(graph.plan, m)), ACTUATOR * len(m.drives)) for m in graph.plan.modules)
-    layers = max(_deepest(graph, m) for m in range(len(graph.plan.modules))) + 1
+    slots = [len(own) + len(input_groups(graph, m)) - 1 for m, own in enumerate(graph.inputs)]
+    room = max(max(INPUT * count, ACTUATOR * len(module.drives)) for count, module in zip(slots, modules, strict=True))
+    deepest = max(max(depths(graph.hidden[m], graph.edges[m]).values(), default=0) for m in range(len(modules)))
     width = widest * (2 * SIDE + room) + (widest - 1) * GAP
-    height = len(rows) * (TITLE + OUTPUT_NAMES + INPUT_NAMES + LAYER * layers) + (len(rows) - 1) * GAP
+    height = len(rows) * (TITLE + OUTPUT_NAMES + INPUT_NAMES + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
     return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 10.0).clip(4.0))
 
 
-def lay_out(graph: ChampionGraph, width: float, height: float) -> Layout:
-    """Place all modules and their nodes on a page of the given size."""
-    boxes = _boxes(graph.plan.modules, width, height)
-    places: dict[Node, tuple[float, float]] = {}
-    for m, box in enumerate(boxes):
-        places |= _places(graph, m, box)
-    return Layout(width, height, tuple(boxes), places)
-
-
-def pin_slots(plan: Plan, module: Module) -> list[int | None]:
-    """The module's pins from left to right, with an empty slot between groups."""
-    slots: list[int | None] = []
-    for group in pin_groups(plan, module):
-        slots += [None, *group] if slots else group
-    return slots
-
-
-def pin_groups(plan: Plan, module: Module) -> list[list[int]]:
-    """The module's pins in their order; neighbours of one kind make a group."""
-    return [list(group) for _, group in groupby(range(len(module.pins)), key=lambda k: plan.kind_of(module.pins[k]))]
-
-
-def depths(hidden: Sequence[int], connections: Iterable[tuple[int, int]]) -> dict[int, int]:
-    """Layer of each hidden node, from 1: one more than that of its deepest source, inputs being 0.
-
-    Connections out of outputs and those that close a cycle do not count. In a cycle the node comes
-    first that inputs or placed nodes reach, then the one that waits for fewest, then the lowest.
-
-    Args:
-        hidden: the hidden nodes of one network.
-        connections: (source, target) of its enabled connections; inputs are negative.
-    """
-    members = set(hidden)
-    sources: dict[int, set[int]] = {node: set() for node in hidden}
-    for source, target in connections:
-        if target in members and source != target and (source < 0 or source in members):
-            sources[target].add(source)
-    found: dict[int, int] = {}
-    while len(found) < len(members):
-        waiting = {
-            node: [s for s in sources[node] if s >= 0 and s not in found] for node in sorted(members - set(found))
-        }
-        reached = {node for node in waiting if len(waiting[node]) < len(sources[node])}
-        chosen = min(waiting, key=lambda node: (bool(waiting[node]), node not in reached, len(waiting[node]), node))
-        found[chosen] = 1 + max((found[s] for s in sources[chosen] if s in found), default=0)
-    return found
-
-
-def _boxes(modules: Sequence[Module], width: float, height: float) -> list[Box]:
-    directions = page_direction(modules)
-    rows = _rows(directions)
+def lay_out(graph: ChampionGraph, width: float, height: float) -> tuple[list[Bbox], list[Places]]:
+    """Place every module in a box, and the nodes within it, on a page of the given size; rows of boxes are centred."""
+    rows = _rows(page_direction(graph.plan.modules))
     columns = max(len(row) for row in rows)
     box_width = (width - (columns - 1) * GAP) / columns
     box_height = (height - (len(rows) - 1) * GAP) / len(rows)
-    boxes = {}
+    boxes: dict[int, Bbox] = {}
     for r, row in enumerate(rows):
-        used = len(row) * box_width + (len(row) - 1) * GAP
+        left = (width - len(row) * box_width - (len(row) - 1) * GAP) / 2
+        bottom = height - (r + 1) * box_height - r * GAP
         for c, m in enumerate(row):
-            x = (width - used) / 2 + c * (box_width + GAP)
-            boxes[m] = Box(x, height - (r + 1) * box_height - r * GAP, box_width, box_height)
-    return [boxes[m] for m in range(len(modules))]
+            boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
+    return [boxes[m] for m in sorted(boxes)], [_places(graph, m, boxes[m]) for m in sorted(boxes)]
+
+
+def input_groups(graph: ChampionGraph, m: int) -> list[list[int]]:
+    """The inputs of module `m` in their order; neighbours that read one kind of thing make a group."""
+    inputs = graph.inputs[m]
+    return [list(group) for _, group in groupby(range(len(inputs)), key=lambda k: graph.kind_of(inputs[k]))]
+
+
+def depths(hidden: Iterable[int], edges: Iterable[Edge]) -> dict[int, int]:
+    """Find the layer of each hidden node, from 1: one more than that of its deepest source, inputs being 0.
+
+    Connections out of outputs and those that close a cycle do not count. In a cycle the node comes
+    first that inputs or placed nodes reach, then the one that waits for fewest, then the lowest.
+    """
+    sources: dict[int, set[int]] = {node: set() for node in sorted(hidden)}
+    for source, target, _ in edges:
+        if target in sources and source != target and (source < 0 or source in sources):
+            sources[target].add(source)
+    found: dict[int, int] = {}
+
+    def turn(node: int) -> tuple[bool, bool, int]:
+        waits_for = sum(source >= 0 and source not in found for source in sources[node])
+        return waits_for > 0, waits_for == len(sources[node]), waits_for
+
+    while len(found) < len(sources):
+        chosen = min((node for node in sources if node not in found), key=turn)
+        found[chosen] = 1 + max((found.get(source, 0) for source in sources[chosen]), default=0)
+    return found
 
 
 def _rows(directions: Sequence[tuple[float, float]]) -> list[list[int]]:
@@ -145,7 +99,7 @@ def _rows(directions: Sequence[tuple[float, float]]) -> list[list[int]]:
     heights = [up for _, up in directions]
     tolerance = _SAME_ROW * (max(heights) - min(heights))
     rows: list[list[int]] = []
-    for m in sorted(range(len(directions)), key=lambda m: (-heights[m], m)):
+    for m in sorted(range(len(directions)), key=lambda m: -heights[m]):
         if rows and heights[rows[-1][0]] - heights[m] <= tolerance:
             rows[-1].append(m)
         else:
@@ -153,74 +107,51 @@ def _rows(directions: Sequence[tuple[float, float]]) -> list[list[int]]:
     return [sorted(row, key=lambda m: (directions[m][0], m)) for row in rows]
 
 
-def _deepest(graph: ChampionGraph, m: int) -> int:
-    return max(_depths_of(graph, m).values(), default=0)
-
-
-def _depths_of(graph: ChampionGraph, m: int) -> dict[int, int]:
-    return depths(graph.hidden[m], [(e.source[1], e.target[1]) for e in graph.edges if e.source[0] == m])
-
-
-def _places(graph: ChampionGraph, m: int, box: Box) -> dict[Node, tuple[float, float]]:
-    module = graph.plan.modules[m]
-    bottom = box.y + INPUT_NAMES
-    top = box.y + box.height - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
-    slots = pin_slots(graph.plan, module)
-    spread = _spread(box, len(slots))
-    places = {(m, -1 - k): (spread[slot], bottom) for slot, k in enumerate(slots) if k is not None}
-    found = _depths_of(graph, m)
-    deepest = max(found.values(), default=0)
-    for depth in range(1, deepest + 1):
-        layer = _sorted_by_sources(graph, m, [node for node in graph.hidden[m] if found[node] == depth], places)
-        y = bottom + (top - bottom) * depth / (deepest + 1)
-        places |= {(m, node): (x, y) for node, x in zip(layer, _spread(box, len(layer)), strict=True)}
-    places |= {(m, output): (x, top) for output, x in enumerate(_spread(box, module.outputs))}
-    for depth in range(1, deepest + 1):
-        layer = [node for node in graph.hidden[m] if found[node] == depth]
-        places |= _sidestepped(graph, m, layer, places, step=(box.width - 2 * SIDE) / len(layer))
+def _places(graph: ChampionGraph, m: int, box: Bbox) -> Places:
+    """Inputs at the bottom, outputs at the top, hidden nodes in layers between them."""
+    module, edges = graph.plan.modules[m], graph.edges[m]
+    bottom, top = box.y0 + INPUT_NAMES, box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
+    groups = input_groups(graph, m)
+    slots = _spread(box, len(module.pins) + len(groups) - 1)
+    # An empty slot between groups.
+    places = {-1 - k: (slots[k + gap], bottom) for gap, group in enumerate(groups) for k in group}
+    depth = depths(graph.hidden[m], edges)
+    by_depth = sorted(graph.hidden[m], key=depth.__getitem__)
+    layers = [list(layer) for _, layer in groupby(by_depth, key=depth.__getitem__)]
+    for d, layer in enumerate(layers, start=1):
+        y = bottom + (top - bottom) * d / (len(layers) + 1)
+        ordered = sorted(layer, key=lambda node: (_centre(node, edges, places), node))
+        places |= {node: (x, y) for node, x in zip(ordered, _spread(box, len(layer)), strict=True)}
+    places |= {output: (x, top) for output, x in enumerate(_spread(box, module.outputs))}
+    for layer in layers:
+        places |= _sidestepped(layer, edges, places, step=(box.width - 2 * SIDE) / len(layer))
     return places
 
 
-def _spread(box: Box, count: int) -> list[float]:
+def _spread(box: Bbox, count: int) -> list[float]:
     """`count` places across the box, centred, each in the middle of an equal share of its width."""
     room = box.width - 2 * SIDE
-    return [box.x + SIDE + room * (k + 0.5) / count for k in range(count)]
+    return [box.x0 + SIDE + room * (k + 0.5) / count for k in range(count)]
 
 
-def _sorted_by_sources(
-    graph: ChampionGraph, m: int, layer: list[int], places: dict[Node, tuple[float, float]]
-) -> list[int]:
-    """Nodes in the order of the mean place of what they read, weighted, so that fewer lines cross."""
-    centres = {}
-    for node in layer:
-        incoming = [e for e in graph.edges if e.target == (m, node) and e.source in places]
-        weights = [abs(edge.weight) for edge in incoming]
-        x = [places[edge.source][0] for edge in incoming]
-        centres[node] = float(np.average(x, weights=weights)) if sum(weights) > 0 else np.inf
-    return sorted(layer, key=lambda node: (centres[node], node))
+def _centre(node: int, edges: Iterable[Edge], places: Places) -> float:
+    """The mean place of what a node reads, weighted: nodes in this order have fewer lines cross."""
+    read = [edge for edge in edges if edge.target == node and edge.source in places]
+    total = sum(abs(edge.weight) for edge in read)
+    return sum(places[edge.source][0] * abs(edge.weight) for edge in read) / total if total > 0 else np.inf
 
 
-def _sidestepped(
-    graph: ChampionGraph, m: int, layer: list[int], places: dict[Node, tuple[float, float]], step: float
-) -> dict[Node, tuple[float, float]]:
+def _sidestepped(layer: Sequence[int], edges: Iterable[Edge], places: Places, step: float) -> Places:
     """The layer, moved aside if connections that skip it would seem to end at its nodes."""
-    passing = [
-        (places[e.source], places[e.target])
-        for e in graph.edges
-        if e.source[0] == m and e.source[1] not in layer and e.target[1] not in layer
-    ]
-
-    def shifted(share: float) -> dict[Node, tuple[float, float]]:
-        return {(m, node): (places[m, node][0] + share * step, places[m, node][1]) for node in layer}
+    y = places[layer[0]][1]
+    crossings = []
+    for edge in edges:
+        (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
+        if min(y0, y1) < y < max(y0, y1):
+            crossings.append(x0 + (y - y0) / (y1 - y0) * (x1 - x0))
 
     def hits(share: float) -> int:
-        return sum(_touches(start, end, at) for at in shifted(share).values() for start, end in passing)
+        return sum(abs(places[node][0] + share * step - x) < CLEAR for node in layer for x in crossings)
 
-    return shifted(min(_SHIFTS, key=hits))
-
-
-def _touches(start: tuple[float, float], end: tuple[float, float], at: tuple[float, float]) -> bool:
-    if not min(start[1], end[1]) < at[1] < max(start[1], end[1]):
-        return False
-    x = start[0] + (at[1] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
-    return abs(x - at[0]) < _CLEAR
+    share = min(_SHIFTS, key=hits)
+    return {node: (places[node][0] + share * step, y) for node in layer}

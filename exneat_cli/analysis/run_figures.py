@@ -8,129 +8,135 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.analysis.csv_files import read_csv
-from exneat_cli.analysis.figures import new_figure, save_figure, style, tick_levels
-from exneat_cli.records import HISTORY_COLUMNS, UNPERTURBED, RobustnessRow, RunDirectory
+from exneat_cli.analysis import styles
+from exneat_cli.analysis.study import read_csv
+from exneat_cli.records import HISTORY_COLUMNS, UNPERTURBED, RobustnessRow, RunDirectory, read_robustness
 
 MOST_PREY = 50
 """Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
 MOST_COLUMNS = 3
-_SPREAD = "one standard deviation over episodes"
+_CURVES: dict[str, styles.Look] = {
+    "best_so_far": {"label": "best so far", "color": "#222222", "linewidth": 1.2, "linestyle": "--"},
+    "best_fitness": {"label": "best of the generation", "color": styles.BLUE, "linewidth": 1.8},
+    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8},
+    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2},
+}
 
 
 def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
-    """Best, mean and median fitness per generation, and the best so far, as PNG and SVG.
-
-    Args:
-        run: whose history.csv is drawn.
-        fitness_name: label of the vertical axis, e.g. ``forward reward``.
-    """
+    """Draw the fitness per generation in a run's history.csv, as PNG and SVG; `fitness_name` is its label."""
     history = read_csv(run.history, HISTORY_COLUMNS)
-    curves = {
-        "best_so_far": ("best so far", "#222222", 1.2, "--"),
-        "best_fitness": ("best of the generation", "#0072b2", 1.8, "-"),
-        "mean_fitness": ("mean", "#d55e00", 1.8, "-"),
-        "median_fitness": ("median", "#009e73", 1.2, "-"),
-    }
-    with style():
-        figure = new_figure()
+    with styles.style():
+        figure = Figure(figsize=(7.0, 4.2), layout="constrained")
         axes = figure.add_subplot()
-        for column, (label, colour, width, line) in curves.items():
-            axes.plot(history["generation"], history[column], line, label=label, color=colour, linewidth=width)
+        for column, look in _CURVES.items():
+            axes.plot(history["generation"], history[column], **look)
         axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(loc="upper left")
-    return save_figure(figure, run.plots / "training")
-
-
-def draw_path(run: RunDirectory) -> list[Path]:
-    """The agent at work in the first test episode, as PNG and SVG.
-
-    In a grid world: its path over the tiles and their cues, and the paths of prey. Elsewhere: its path over
-    the ground, coloured by time.
-    """
-    trace = read_csv(run.trace)
-    if run.tiles.exists():
-        return _draw_on_tiles(run, trace, read_csv(run.tiles))
-    with style():
-        figure = new_figure(7.0, 3.6)
-        axes = figure.add_subplot()
-        axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
-        points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
-        axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color="#d55e00", label="start", zorder=3)
-        axes.set(title=f"{run.path.name}: first test episode", xlabel="x, ahead (m)", ylabel="y, left (m)")
-        axes.set_aspect("equal", adjustable="datalim")
-        figure.colorbar(points, ax=axes, label="control step")
-        axes.legend(loc="best")
-    return save_figure(figure, run.plots / "path")
+    return styles.save_figure(figure, run.plots / "training")
 
 
 def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: str) -> list[Path]:
-    """Fitness at each level of each sweep in robustness.csv, as PNG and SVG; no files if it holds no sweep.
+    """Draw fitness at each level of each sweep in a run's robustness.csv, as PNG and SVG; no files without a sweep.
 
-    Of a level that was tested more than once, the row with the most episodes is shown.
-
-    Args:
-        run: whose robustness.csv is drawn.
-        labels: name of a sweep -> label of its axis; a sweep without one is called by its name.
-        fitness_name: label of the vertical axes, e.g. ``forward reward``.
+    Of a level that was tested more than once, the row with the most episodes is shown. `labels` are those of the axes
+    by the sweeps' names, which stand in where there is none; `fitness_name` is that of the vertical axes.
     """
-    rows = read_csv(run.robustness, RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
+    tested = [row for row in read_robustness(run.robustness) if row.parameter != UNPERTURBED]
+    rows = pd.DataFrame(tested, columns=RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
     rows = rows.drop_duplicates(["parameter", "level"], keep="last")
-    sweeps = [name for name in dict.fromkeys(rows["parameter"]) if name != UNPERTURBED]
+    sweeps = list(rows.groupby("parameter"))
     if not sweeps:
         return []
     columns = min(len(sweeps), MOST_COLUMNS)
     lines = math.ceil(len(sweeps) / columns)
-    with style():
-        figure = new_figure(max(6.2, 3.6 * columns), 3.0 * lines + 0.9)
+    with styles.style():
+        figure = Figure(figsize=(max(6.2, 3.6 * columns), 3.0 * lines + 0.9), layout="constrained")
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
-        for axes, sweep in zip(panels, sweeps, strict=False):
-            levels = rows[rows["parameter"] == sweep]
-            x, mean, spread = (levels[column].to_numpy() for column in ("level", "fitness_mean", "fitness_std"))
-            axes.fill_between(
-                x, mean - spread, mean + spread, color="#0072b2", alpha=0.18, linewidth=0.0, label=_SPREAD
-            )
-            axes.plot(x, mean, "o-", color="#0072b2", markersize=4.0, label="mean over episodes")
-            tick_levels(axes, x)
-            axes.set(xlabel=labels.get(sweep, sweep), ylabel=fitness_name)
+        for axes, (sweep, levels) in zip(panels, sweeps, strict=False):
+            x, mean, spread = levels["level"], levels["fitness_mean"], levels["fitness_std"]
+            band = {
+                "color": styles.BLUE,
+                "alpha": 0.18,
+                "linewidth": 0.0,
+                "label": "one standard deviation over episodes",
+            }
+            axes.fill_between(x, mean - spread, mean + spread, **band)
+            axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
+            styles.tick_levels(axes, x)
+            axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
         for axes in panels[len(sweeps) :]:
             axes.remove()
         figure.suptitle(f"{run.path.name}: robustness")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return save_figure(figure, run.plots / "robustness")
+    return styles.save_figure(figure, run.plots / "robustness")
 
 
-def _draw_on_tiles(run: RunDirectory, trace: pd.DataFrame, tiles: pd.DataFrame) -> list[Path]:
-    with style():
-        figure = new_figure(9.0, 4.4)
-        for channel, axes in enumerate(figure.subplots(1, 2), start=1):
-            cues = tiles.pivot(index="row", columns="column", values=f"channel_{channel}").to_numpy()
-            path = tiles.pivot(index="row", columns="column", values="path").to_numpy()
-            picture = axes.imshow(np.ma.masked_where(path == 0, cues), cmap="YlOrBr", vmin=0.0)
-            axes.set_facecolor("#444444")
-            prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
-            for name in prey[:MOST_PREY]:
-                _draw_prey(axes, trace, name)
-            if "goal_row" in trace:
-                axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color="#009e73", markersize=12)
-            axes.plot(trace["column"], trace["row"], "-", color="#0072b2", linewidth=2.0)
-            axes.plot(trace["column"].iloc[0], trace["row"].iloc[0], "o", color="#0072b2", label="start")
-            axes.plot(trace["column"].iloc[-1], trace["row"].iloc[-1], "s", color="#0072b2", label="end")
-            axes.set(title=f"channel {channel}", xticks=[], yticks=[])
-            axes.grid(visible=False)
-            figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
-        figure.suptitle(f"{run.path.name}: first test episode")
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return save_figure(figure, run.plots / "path")
+def draw_path(run: RunDirectory) -> list[Path]:
+    """Draw the agent at work in the first test episode, as PNG and SVG.
+
+    In a grid world: its path over the tiles and their cues, and the paths of prey. On the ground: its path,
+    coloured by time. Where a task tells no place: its reward terms over time.
+    """
+    trace = read_csv(run.trace)
+    title = f"{run.path.name}: first test episode"
+    with styles.style():
+        if run.tiles.exists():
+            figure = _on_tiles(trace, read_csv(run.tiles))
+            figure.suptitle(title)
+        elif {"x", "y"} <= set(trace.columns):
+            figure = _on_ground(trace, title)
+        else:
+            figure = _over_time(trace, title)
+    return styles.save_figure(figure, run.plots / "path")
 
 
-def _draw_prey(axes: Axes, trace: pd.DataFrame, prey: str) -> None:
-    free = trace[trace[f"{prey}_free"] == 1]
-    axes.plot(free[f"{prey}_column"], free[f"{prey}_row"], "-", color="#009e73", linewidth=1.0)
-    caught = len(free) < len(trace)
-    last = trace.iloc[min(len(free), len(trace) - 1)]
-    axes.plot(last[f"{prey}_column"], last[f"{prey}_row"], "x" if caught else ".", color="#009e73")
+def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
+    points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
+    axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
+    axes.set(title=title, xlabel="x, ahead (m)", ylabel="y, left (m)")
+    axes.set_aspect("equal", adjustable="datalim")
+    figure.colorbar(points, ax=axes, label="control step")
+    axes.legend(loc="best")
+    return figure
+
+
+def _over_time(trace: pd.DataFrame, title: str) -> Figure:
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    for term in trace.columns.drop("step"):
+        axes.plot(trace["step"], trace[term], label=term.replace("_", " "))
+    axes.set(title=title, xlabel="control step", ylabel="reward of the step")
+    axes.legend(loc="best")
+    return figure
+
+
+def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    grid = tiles.pivot(index="row", columns="column")
+    prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
+    for channel, axes in enumerate(figure.subplots(1, 2), start=1):
+        cues = np.ma.masked_where(grid["path"] == 0, grid[f"channel_{channel}"])
+        picture = axes.imshow(cues, cmap="YlOrBr", vmin=0.0)
+        for name in prey[:MOST_PREY]:
+            row, column, is_free = trace[f"{name}_row"], trace[f"{name}_column"], trace[f"{name}_free"] == 1
+            axes.plot(column[is_free], row[is_free], "-", color=styles.GREEN, linewidth=1.0)
+            end = min(is_free.sum(), len(trace) - 1)
+            axes.plot(column.iloc[end], row.iloc[end], "." if is_free.all() else "x", color=styles.GREEN)
+        if "goal_row" in trace:
+            axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color=styles.GREEN, markersize=12)
+        axes.plot(trace["column"], trace["row"], "-", color=styles.BLUE, linewidth=2.0)
+        for place, marker, label in ((0, "o", "start"), (-1, "s", "end")):
+            axes.plot(trace["column"].iloc[place], trace["row"].iloc[place], marker, color=styles.BLUE, label=label)
+        axes.set(title=f"channel {channel}", xticks=[], yticks=[], facecolor=styles.GREY)
+        axes.grid(visible=False)
+        figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure

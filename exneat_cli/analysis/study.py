@@ -1,4 +1,4 @@
-"""What a report is made from: the planned runs of experiments, and their CSV files as tables.
+"""What a report is made from: the planned runs of experiments, and what their files hold, as tables.
 
 A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, so
 runs with other settings never slip in, whatever else lies in the same folder.
@@ -7,15 +7,19 @@ runs with other settings never slip in, whatever else lies in the same folder.
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Mapping
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
 
 import pandas as pd
 
-from exneat_cli.analysis.csv_files import read_csv
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import DONE, HISTORY_COLUMNS, RobustnessRow, RunDirectory
+from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDirectory, read_robustness
+
+BEST = 5
+"""How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
+_RESULTS = ("training", "validation", "test", "full_reward", "episodes", "env_steps", "wall_seconds")
 
 
 class MissingRunsError(ExneatError):
@@ -49,7 +53,7 @@ class Study:
         claim: what it is to show, in one sentence.
         command: the command line that makes what is missing.
         fitness_name: what the task's fitness is, in words.
-        has_full_reward: whether the task has a second figure.
+        has_full_reward: whether the task has a second score.
         variants: name -> label, in the order of legends; the first is what others are compared with.
         baselines: names of those variants that nothing trains.
         conditions: name -> label.
@@ -74,23 +78,30 @@ class Study:
     sweep_episodes: int | None = None
 
     @property
+    def first_variant(self) -> str:
+        """The variant that the others are compared with."""
+        return next(iter(self.variants))
+
+    @property
     def trained_variants(self) -> tuple[str, ...]:
         """Names of the variants that learn."""
         return tuple(name for name in self.variants if name not in self.baselines)
 
     def only(self, trained: Collection[str]) -> Study:
         """The same study with these trained variants alone, and its baselines."""
-        kept = {
-            variant: label
-            for variant, label in self.variants.items()
-            if variant in trained or variant in self.baselines
-        }
+        kept = {name: label for name, label in self.variants.items() if name in trained or name in self.baselines}
         return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
 
     @functools.cached_property
+    def manifests(self) -> Mapping[PlannedRun, Manifest]:
+        """The finished runs with their manifests."""
+        finished = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
+        return {run: run.directory.read_manifest() for run in finished}
+
+    @property
     def finished(self) -> tuple[PlannedRun, ...]:
         """The runs that are done."""
-        return tuple(run for run in self.runs if _is_finished(run))
+        return tuple(self.manifests)
 
     def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
         """Finished runs of one variant in one condition, in the order of their seeds."""
@@ -104,61 +115,79 @@ class Study:
         """
         missing = [self.variants[variant] for variant in variants if not self.of(condition, variant)]
         if missing:
-            what = f"{self.experiment}, {condition}, budget {self.budget}: no finished run of {', '.join(missing)}"
-            raise MissingRunsError(f"{what}\n  {self.command}")
+            raise self.lacking(condition, f"no finished run of {', '.join(missing)}")
 
-    def history(self, condition: str, variant: str) -> pd.DataFrame:
-        """history.csv of all finished runs, one under another, with a column ``seed``; may be empty."""
-        return _stacked(
-            [(run, read_csv(run.directory.history, HISTORY_COLUMNS)) for run in self.of(condition, variant)]
-        )
+    def lacking(self, condition: str, what: str) -> MissingRunsError:
+        """The error that says what `condition` lacks, and the command that makes it."""
+        return MissingRunsError(f"{self.experiment}, {condition}, budget {self.budget}: {what}\n  {self.command}")
 
-    def robustness(self, condition: str, variant: str) -> pd.DataFrame:
-        """The planned rows of robustness.csv of all finished runs, with a column ``seed``; may be empty.
+    @functools.cached_property
+    def results(self) -> pd.DataFrame:
+        """One row per finished run: what it reached, and what its training spent.
+
+        Columns: condition, variant, seed; training (final best so far), validation, test and full_reward (the
+        champion's means over episodes); episodes, env_steps and wall_seconds of training. NaN for what a run lacks:
+        baselines have test figures alone.
+        """
+        rows = []
+        for run, manifest in self.manifests.items():
+            result = manifest.result
+            assert result is not None
+            figures = {"training": result.training, "validation": result.validation}
+            test = {"test": result.champion.fitness_mean, "full_reward": result.champion.full_reward_mean}
+            place = {"condition": run.condition, "variant": run.variant, "seed": run.seed}
+            rows.append({**figures, **manifest.budget_spent, **test, **place})
+        table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_RESULTS])
+        return table.astype(dict.fromkeys(_RESULTS, float))
+
+    def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
+        """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
+        validation = dict(zip(self.manifests, self.results["validation"].fillna(-math.inf), strict=True))
+        return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
+
+    def history(self, condition: str) -> pd.DataFrame:
+        """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
+        tables = [
+            read_csv(run.directory.history, HISTORY_COLUMNS).assign(variant=run.variant, seed=run.seed)
+            for run in self.finished
+            if run.condition == condition and run.variant not in self.baselines
+        ]
+        nothing = pd.DataFrame(columns=[*HISTORY_COLUMNS, "variant", "seed"], dtype=float)
+        return pd.concat(tables or [nothing], ignore_index=True)
+
+    def robustness(self, condition: str) -> pd.DataFrame:
+        """The planned rows of robustness.csv of all finished runs, with columns ``variant`` and ``seed``.
 
         Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
         """
-        runs = [run for run in self.of(condition, variant) if run.directory.robustness.exists()]
-        table = _stacked([(run, read_csv(run.directory.robustness, RobustnessRow._fields)) for run in runs])
-        return table if table.empty else table[self._is_planned(table)].reset_index(drop=True)
-
-    def _is_planned(self, table: pd.DataFrame) -> pd.Series[bool]:
-        planned = pd.Series(True, index=table.index)
-        if self.sweep_episodes is not None:
-            planned &= table["episodes"] == self.sweep_episodes
-        if self.levels is not None:
-            wanted = {(sweep, float(level)) for sweep, levels in self.levels.items() for level in levels}
-            keys = zip(table["parameter"], table["level"].astype(float), strict=True)
-            planned &= pd.Series([key in wanted for key in keys], index=table.index)
-        return planned
-
-    def results(self, condition: str, variant: str) -> pd.DataFrame:
-        """One row per finished run: seed, training (final best so far), validation, test, full_reward."""
         rows = [
-            {"seed": run.seed, **_result(run.directory.read_manifest()["result"])}
-            for run in self.of(condition, variant)
+            (*row._replace(variant=run.variant), run.seed)
+            for run in self.finished
+            if run.condition == condition
+            for row in read_robustness(run.directory.robustness)
+            if self._is_planned(row)
         ]
-        return pd.DataFrame(rows, columns=["seed", "training", "validation", "test", "full_reward"])
+        return pd.DataFrame(rows, columns=[*RobustnessRow._fields, "seed"])
+
+    def _is_planned(self, row: RobustnessRow) -> bool:
+        is_level = self.levels is None or row.level in self.levels.get(row.parameter, ())
+        return is_level and self.sweep_episodes in (None, row.episodes)
 
 
-def _is_finished(run: PlannedRun) -> bool:
-    if not run.directory.is_there():
-        return False
-    manifest = run.directory.read_manifest()
-    return manifest.get("status") == DONE and run.generations in (None, manifest.get("generations"))
+def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
+    """Read a table of numbers that somebody may have edited; `columns` are those that it must have.
 
-
-def _result(result: Mapping[str, Any]) -> dict[str, float]:
-    champion = result["champion"]
-    return {
-        "training": result.get("training", float("nan")),
-        "validation": result.get("validation", float("nan")),
-        "test": champion["fitness_mean"],
-        "full_reward": champion["full_reward_mean"],
-    }
-
-
-def _stacked(tables: list[tuple[PlannedRun, pd.DataFrame]]) -> pd.DataFrame:
-    if not tables:
-        return pd.DataFrame()
-    return pd.concat([table.assign(seed=run.seed) for run, table in tables], ignore_index=True)
+    Raises:
+        ExneatError: the file is missing or damaged.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            table = pd.read_csv(file)
+    except OSError as error:
+        raise ExneatError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ExneatError(f"{path}: damaged: {str(error).strip().splitlines()[-1]}") from error
+    for column in columns:
+        if column not in table or not pd.api.types.is_numeric_dtype(table[column]):
+            raise ExneatError(f"{path}: damaged: expected numbers in a column {column}")
+    return table

@@ -1,200 +1,232 @@
-"""The tables of the catalogue: published figures beside ours."""
+"""Tables as CSV for machines and Markdown for people: those of the catalogue, and one comparison per experiment.
+
+Both show lines of a summary, one per condition, variant and quantity: a table of the catalogue one under another,
+beside what was published; a comparison with the quantities side by side.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from exneat_cli.analysis import captions
-from exneat_cli.analysis.artefacts import Built
-from exneat_cli.analysis.catalogue import TablePlan, TableRow
-from exneat_cli.analysis.quantities import BEST, best_on_validation, efficiency_of, per_run, require_level
-from exneat_cli.analysis.statistics import Interval, Summary, compare, mean
-from exneat_cli.analysis.study import Study
-from exneat_cli.analysis.table_files import decimals_for, figure_cell, interval_cell, p_cell, write_table
-from exneat_cli.errors import ExneatError
+import numpy as np
+import pandas as pd
 
-_NAN = math.nan
-_CSV = (
-    "condition",
-    "variant",
-    "quantity",
-    "published",
-    "mean",
-    "low",
-    "high",
-    "iqm",
-    "best_5",
-    "runs",
-    "p_holm",
-    "a12",
-)
-_NOTHING = Summary(0, _NAN, _NAN, Interval(_NAN, _NAN), _NAN, _NAN)
+from exneat_cli.analysis.captions import table_sentences
+from exneat_cli.analysis.catalogue import Built, Column, TablePlan
+from exneat_cli.analysis.statistics import compare, efficiency, mean
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study
+from exneat_cli.errors import check_choice
+from exneat_cli.records import make_directory, write_whole
 
-
-@dataclass(frozen=True)
-class _Line:
-    """One row and column of the plan; `efficiency` is empty but for lines of efficiency, which have no summary."""
-
-    condition: str
-    variant: str
-    quantity: str
-    published: str
-    runs: int = 0
-    summary: Summary = _NOTHING
-    best: float = _NAN
-    efficiency: str = ""
+STATISTICS = ["mean", "low", "high", "iqm", "best_5"]
+"""Columns of a summary that are in the unit of their quantity."""
+_KEY = ["experiment", "condition", "variant", "quantity"]
+_SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
+LARGE = 10.0
+"""Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
+_PLACE = ["condition", "variant", "quantity", "published"]
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
-    """Write one table of the catalogue as ``<name>.csv`` and ``<name>.md``: one line per row and column of the plan.
-
-    Args:
-        plan: which variants and quantities.
-        studies: by the name of their experiment.
-        directory: where the files go; made if need be.
+    """Write ``<name>.csv`` and ``<name>.md`` into `directory`: one line per row and column of the plan.
 
     Raises:
         MissingRunsError: a variant of the table, or the one that it is compared with, lacks runs or a level.
         ExneatError: the plan names something unknown, or a file cannot be written.
     """
-    _check(plan, studies)
-    _require(plan, studies)
-    lines = list(_lines(plan, studies))
-    decimals = {name: decimals_for(_printed(lines, name)) for name in plan.columns}
-    table = Built(
-        name=plan.name,
-        title=plan.title,
-        caption=" ".join(filter(None, _sentences(plan, studies, min(line.runs for line in lines)))),
-        paths=(),
-        header=_header(plan),
-        rows=tuple(_cells(plan, line, decimals[line.quantity]) for line in lines),
-    )
-    return write_table(directory, table, _CSV, [_exact(line) for line in lines])
+    lines = _planned_lines(plan, studies)
+    of = {column.of for column in plan.columns.values()}
+    sentences: list[str] = []
+    for experiment, own in lines.groupby("experiment", sort=False):
+        sentences += table_sentences(studies[str(experiment)], own, of)
+    best = {}
+    if "robustness" in of:
+        best = {"best_5": f"ours, best {BEST}"}
+        mean_of_best = f"mean over the {BEST} runs that are best on validation, or all if there are fewer."
+        sentences.append(f"Best {BEST}: {mean_of_best}")
+    ours = {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM", **best}
+    headings = {**dict(zip(_PLACE, _PLACE, strict=True)), **ours, "runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
+    labelled = _labelled(lines, studies)
+    exact = labelled[[*_PLACE, *STATISTICS, "runs", "p_holm", "a12"]]
+    is_number = lines["efficiency"] == ""
+    exact = exact.assign(mean=lines["mean"].astype(object).where(is_number, lines["efficiency"]))
+    cells = _printed(labelled)[list(headings)].set_axis(list(headings.values()), axis=1)
+    caption = " ".join(filter(None, [*sentences, plan.note]))
+    return _write(directory, Built(plan.name, plan.title, caption, ()), exact, cells)
 
 
-def _check(plan: TablePlan, studies: Mapping[str, Study]) -> None:
-    if not plan.rows or not plan.columns:
-        raise ExneatError(f"{plan.name}: expected at least one row and one column")
-    for name, column in plan.columns.items():
-        if column.of == "robustness" and (column.sweep is None or column.level is None):
-            raise ExneatError(f"{plan.name}: {name}: expected a sweep and a level, got {column.sweep}, {column.level}")
+def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFrame:
+    """The lines of the summary that the plan shows, in its order, with a column ``published``."""
+    rows = []
     for row in plan.rows:
-        study = studies.get(row.experiment)
-        if study is None:
-            raise ExneatError(f"{plan.name}: expected an experiment of {', '.join(studies)}, got {row.experiment!r}")
-        _check_known(f"{plan.name}: {row.experiment}", "condition", row.condition, study.conditions)
-        _check_known(f"{plan.name}: {row.experiment}", "variant", row.variant, study.variants)
-        for column_name in row.published:
-            _check_known(f"{plan.name}: published", "column", column_name, plan.columns)
-
-
-def _check_known(where: str, what: str, name: str, known: Mapping[str, object]) -> None:
-    if name not in known:
-        raise ExneatError(f"{where}: expected a {what} of {', '.join(known)}, got {name!r}")
-
-
-def _require(plan: TablePlan, studies: Mapping[str, Study]) -> None:
-    for experiment, condition in _places(plan):
-        study = studies[experiment]
-        variants = [row.variant for row in plan.rows if (row.experiment, row.condition) == (experiment, condition)]
-        study.require(condition, dict.fromkeys((next(iter(study.variants)), *variants)))
-        for column in plan.columns.values():
-            if column.of == "robustness":
-                require_level(study, condition, variants, column)
-
-
-def _places(plan: TablePlan) -> list[tuple[str, str]]:
-    """Experiment and condition of all rows, each pair once."""
-    return list(dict.fromkeys((row.experiment, row.condition) for row in plan.rows))
-
-
-def _lines(plan: TablePlan, studies: Mapping[str, Study]) -> Iterator[_Line]:
-    values = {
-        (*place, name): {
-            variant: per_run(studies[place[0]], place[1], variant, column) for variant in studies[place[0]].variants
-        }
-        for place in _places(plan)
-        for name, column in plan.columns.items()
-        if column.of != "efficiency"
-    }
-    summaries = {
-        key: compare({variant: list(runs.values()) for variant, runs in variants.items()}, studies[key[0]].baselines)
-        for key, variants in values.items()
-    }
-    for row in plan.rows:
+        check_choice(f"{plan.name}: experiment", row.experiment, tuple(studies))
         study = studies[row.experiment]
-        for name, column in plan.columns.items():
-            line = _Line(
-                study.conditions[row.condition], study.variants[row.variant], name, str(row.published.get(name, ""))
-            )
-            key = (row.experiment, row.condition, name)
+        check_choice(f"{plan.name}: condition of {row.experiment}", row.condition, tuple(study.conditions))
+        check_choice(f"{plan.name}: variant of {row.experiment}", row.variant, tuple(study.variants))
+        place = (row.experiment, row.condition, row.variant)
+        rows += [(*place, name, str(row.published.get(name, ""))) for name in plan.columns]
+    planned = pd.DataFrame(rows, columns=[*_KEY, "published"])
+    for (experiment, condition), own in planned.groupby(["experiment", "condition"], sort=False):
+        study = studies[str(experiment)]
+        study.require(str(condition), dict.fromkeys([study.first_variant, *own["variant"]]))
+    summaries = [
+        _summary(studies[str(experiment)], own["condition"].unique(), plan.columns)
+        for experiment, own in planned.groupby("experiment", sort=False)
+    ]
+    lines = planned.merge(pd.concat(summaries), on=_KEY, how="left")
+    swept = [name for name, column in plan.columns.items() if column.of == "robustness"]
+    unmeasured = lines[lines["quantity"].isin(swept) & (lines["runs"] == 0)]
+    for (experiment, condition, quantity), own in unmeasured.groupby(["experiment", "condition", "quantity"]):
+        study, column = studies[str(experiment)], plan.columns[str(quantity)]
+        labels = ", ".join(own["variant"].map(study.variants))
+        raise study.lacking(str(condition), f"sweep {column.sweep}, level {column.level}: not measured for {labels}")
+    return lines
+
+
+def build_comparison(study: Study, directory: Path) -> Built:
+    """Write ``comparison-<experiment>.csv`` and ``.md`` into `directory`: one line per condition and variant.
+
+    Conditions without a finished run are left out. Where the first variant has none, nothing is compared with it.
+
+    Raises:
+        MissingRunsError: no run is finished at all.
+        ExneatError: a file cannot be written.
+    """
+    if not study.finished:
+        what = f"{study.experiment}, budget {study.budget}: no finished run to compare"
+        raise MissingRunsError(f"{what}\n  {study.command}")
+    conditions = [name for name in study.conditions if (study.results["condition"] == name).any()]
+    measured = ["training", "test", *(["full_reward"] if study.has_full_reward else [])]
+    columns = {name: Column(of=name) for name in (*measured, "efficiency")}
+    exact = [("runs", "efficiency", "runs")]
+    exact += [(f"{name}_{each}", name, each) for name in measured for each in STATISTICS if each != "best_5"]
+    exact += [(f"test_{each}", "test", each) for each in ("p_holm", "a12")]
+    exact += [("efficiency", "efficiency", "efficiency")]
+    shown = [("runs", "efficiency", "runs")]
+    for name in measured:
+        shown += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
+    shown += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
+    shown += [("efficiency", "efficiency", "mean")]
+    lines = _summary(study, conditions, columns)
+    labelled = _labelled(lines, {study.experiment: study})
+    name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
+    words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
+    return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
+
+
+def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) -> pd.DataFrame:
+    """One line per condition and variant; `columns` are headings, each with a quantity and a column of its lines."""
+    of = {quantity: rows.reset_index(drop=True) for quantity, rows in lines.groupby("quantity")}
+    places = of["efficiency"][["condition", "variant"]]
+    wide = pd.concat([places, *(of[quantity][name] for _, quantity, name in columns)], axis=1)
+    return wide.set_axis([*places, *(heading for heading, _, _ in columns)], axis=1)
+
+
+def _labelled(lines: pd.DataFrame, studies: Mapping[str, Study]) -> pd.DataFrame:
+    """Lines with the labels of conditions and variants in place of their names."""
+    places = lines[["experiment", "condition", "variant"]].itertuples(index=False, name=None)
+    labels = [(studies[e].conditions[condition], studies[e].variants[variant]) for e, condition, variant in places]
+    return lines.assign(condition=[label for label, _ in labels], variant=[label for _, label in labels])
+
+
+def _printed(lines: pd.DataFrame) -> pd.DataFrame:
+    """Lines as text, rounded; all statistics of a quantity with as many decimals as its largest needs."""
+    largest = lines[STATISTICS].abs().max(axis=1).groupby(lines["quantity"]).transform("max")
+    decimals = np.where(largest >= LARGE, 1, 3)
+
+    def cells(column: str) -> list[str]:
+        return [rounded(value, digits) for value, digits in zip(lines[column], decimals, strict=True)]
+
+    return lines.assign(
+        mean=np.where(lines["efficiency"] == "", cells("mean"), lines["efficiency"]),
+        interval=[f"[{low}, {high}]" if low else "" for low, high in zip(cells("low"), cells("high"), strict=True)],
+        iqm=cells("iqm"),
+        best_5=cells("best_5"),
+        runs=lines["runs"].astype(str),
+        p_holm=["<0.001" if p < 0.001 else rounded(p, 3) for p in lines["p_holm"]],
+        a12=[rounded(share, 2) for share in lines["a12"]],
+    )
+
+
+def rounded(value: float, decimals: int) -> str:
+    """Print a number for people; nothing for NaN."""
+    # Adding zero turns a rounded -0.0 into 0.0.
+    return "" if math.isnan(value) else f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFrame) -> Built:
+    """Write ``<name>.csv`` from `exact`, with every digit, and ``<name>.md`` from `cells`."""
+    header, rows = tuple(cells.columns), tuple(cells.itertuples(index=False, name=None))
+    make_directory(directory)
+    paths = directory / f"{words.name}.csv", directory / f"{words.name}.md"
+    write_whole(paths[0], exact.to_csv(index=False, lineterminator="\n"))
+    lines = [f"# {words.name}: {words.title}", "", *map(_line, (header, ["---"] * len(header), *rows))]
+    write_whole(paths[1], "\n".join([*lines, "", words.caption, ""]))
+    return words._replace(paths=paths, header=header, rows=rows)
+
+
+def _line(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"
+
+
+def _summary(study: Study, conditions: Iterable[str], columns: Mapping[str, Column]) -> pd.DataFrame:
+    """One row per condition, quantity and variant of the study, which are compared within each condition.
+
+    Columns: `_SUMMARY`; best_5 is the mean over the `BEST` runs best on validation, of robustness alone. Rows of
+    efficiency, which is a text, count all finished runs and have no statistics.
+    """
+    parts = []
+    for condition in conditions:
+        measured = _measured(study, condition, columns)
+        for name, column in columns.items():
             if column.of == "efficiency":
-                runs = len(study.of(row.condition, row.variant))
-                yield replace(line, runs=runs, efficiency=efficiency_of(study, row.condition, row.variant))
+                runs = {variant: len(study.of(condition, variant)) for variant in study.variants}
+                part = pd.DataFrame({"runs": runs, "efficiency": _efficiencies(study, condition)})
             else:
-                best = _mean_of_best(study, row, values[key][row.variant]) if column.of == "robustness" else _NAN
-                summary = summaries[key][row.variant]
-                yield replace(line, runs=summary.runs, summary=summary, best=best)
+                groups = {variant: runs.droplevel(0) for variant, runs in measured[name].dropna().groupby(level=0)}
+                values = {variant: groups.get(variant, pd.Series(dtype=float)) for variant in study.variants}
+                part = compare({variant: each.to_numpy() for variant, each in values.items()}, study.baselines)
+                part["efficiency"] = ""
+                if column.of == "robustness":
+                    part["best_5"] = [_mean_of_best(study, condition, *each) for each in values.items()]
+            place = {"experiment": study.experiment, "condition": condition, "quantity": name}
+            parts.append(part.rename_axis("variant").reset_index().assign(**place))
+    return pd.concat(parts, ignore_index=True).reindex(columns=_SUMMARY)
 
 
-def _mean_of_best(study: Study, row: TableRow, by_seed: Mapping[int, float]) -> float:
-    seeds = [seed for seed in best_on_validation(study, row.condition, row.variant) if seed in by_seed]
-    return mean([by_seed[seed] for seed in seeds[:BEST]])
+def _measured(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
+    """One row per finished run, indexed by variant and seed; one column per quantity, NaN where a run has none."""
+    results = study.results[study.results["condition"] == condition].set_index(["variant", "seed"])
+    measured = pd.DataFrame(index=results.index)
+    if any(column.of == "robustness" for column in columns.values()):
+        swept = study.robustness(condition).set_index(["variant", "seed"])
+    for name, column in columns.items():
+        if column.of == "robustness":
+            level = np.isclose(swept["level"].astype(float), float(column.level or 0.0))
+            here = swept.loc[level & (swept["parameter"] == column.sweep), f"{column.value}_mean"]
+            measured[name] = here[~here.index.duplicated(keep="last")].astype(float)
+        elif column.of != "efficiency":
+            measured[name] = results[column.of]
+    return measured
 
 
-def _printed(lines: Sequence[_Line], quantity: str) -> Iterator[float]:
-    for line in lines:
-        if line.quantity == quantity:
-            yield from (line.summary.mean, line.summary.iqm, *line.summary.interval, line.best)
+def _mean_of_best(study: Study, condition: str, variant: str, values: pd.Series) -> float:
+    best = [values[run.seed] for run in study.best_first(condition, variant) if run.seed in values]
+    return mean(best[:BEST])
 
 
-def _has_robustness(plan: TablePlan) -> bool:
-    return any(column.of == "robustness" for column in plan.columns.values())
+def _efficiencies(study: Study, condition: str) -> dict[str, str]:
+    """The generation at which each variant's mean curve reaches the final mean of the study's first variant.
 
-
-def _header(plan: TablePlan) -> tuple[str, ...]:
-    best = (f"ours, best {BEST}",) if _has_robustness(plan) else ()
-    figures = ("published", "ours (mean)", "95% interval", "IQM", *best)
-    return ("condition", "variant", "quantity", *figures, "runs", "p (Holm)", "A12")
-
-
-def _cells(plan: TablePlan, line: _Line, decimals: int) -> tuple[str, ...]:
-    summary = line.summary
-    best = (figure_cell(line.best, decimals),) if _has_robustness(plan) else ()
-    ours = line.efficiency or figure_cell(summary.mean, decimals)
-    figures = (line.published, ours, interval_cell(summary.interval, decimals), figure_cell(summary.iqm, decimals))
-    verdict = (str(line.runs), p_cell(summary.p), figure_cell(summary.a12, 2))
-    return (line.condition, line.variant, line.quantity, *figures, *best, *verdict)
-
-
-def _exact(line: _Line) -> tuple[object, ...]:
-    summary = line.summary
-    figures = (line.efficiency or summary.mean, *summary.interval, summary.iqm, line.best)
-    place = (line.condition, line.variant, line.quantity, line.published)
-    return (*place, *figures, line.runs, summary.p, summary.a12)
-
-
-def _sentences(plan: TablePlan, studies: Mapping[str, Study], fewest: int) -> Iterator[str]:
-    quantities = [column.of for column in plan.columns.values()]
-    for experiment in dict.fromkeys(row.experiment for row in plan.rows):
-        study = studies[experiment]
-        rows = [row for row in plan.rows if row.experiment == experiment]
-        conditions = list(dict.fromkeys(row.condition for row in rows))
-        variants = list(dict.fromkeys(row.variant for row in rows))
-        yield captions.runs_sentence(study, conditions, variants)
-        if study.budget != "paper" and any(row.published for row in rows):
-            yield "The published figures rest on a larger budget."
-        yield captions.quantity_sentence(study, quantities)
-        yield captions.interval_sentence()
-        yield captions.few_runs_sentence(fewest)
-        yield captions.test_sentence(study)
-        if "efficiency" in quantities:
-            yield captions.efficiency_sentence(study)
-            yield "Published efficiencies are not exactly comparable."
-        yield captions.budgets_sentence(study, conditions, variants)
-    if _has_robustness(plan):
-        yield f"Best {BEST}: mean over the {BEST} runs that are best on validation, or all if there are fewer."
-    yield plan.note
+    E.g. ``7``, ``>20`` if 20 were not enough, or nothing if the variant or the first one has no curve.
+    """
+    best = study.history(condition).groupby(["variant", "generation"])["best_so_far"].mean()
+    curves = {variant: curve.to_numpy() for variant, curve in best.groupby("variant")}
+    found = dict.fromkeys(study.variants, "")
+    if study.first_variant in curves:
+        target = float(curves[study.first_variant][-1])
+        for variant, curve in curves.items():
+            found[str(variant)] = str(efficiency(curve, target) or f">{len(curve)}")
+    return found

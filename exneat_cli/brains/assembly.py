@@ -1,22 +1,25 @@
-"""From teams and a wiring plan to brains, a whole generation at once."""
+"""From teams and a wiring plan to brains, a whole generation in one compiled call.
+
+A genome is expressed as neat-python's own network classes would build it. Within a network, local index k below the
+number of pins is a pin. The others are value slots of nodes: outputs first, then the initial hidden nodes if other
+modules read them, then whatever else is evaluated, then one that stays 0 and stands for all other nodes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ArrayGenome
-from exneat_cli.algorithms.neat.structure import row_of
-from exneat_cli.brains.brain import Brain, Brains
-from exneat_cli.brains.expression import express
-from exneat_cli.brains.wiring_arrays import WiringArrays, wiring_arrays
+from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, end_to_end, mark_sources, node_row, row_of
+from exneat_cli.brains.brain import Brains
+from exneat_cli.brains.wiring_arrays import wiring_arrays
 from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
 
-def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Brain:
+def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Brains:
     """Compile one genome per subpopulation into the brain that `plan` wires.
 
     Args:
@@ -27,7 +30,7 @@ def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) 
     Raises:
         ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
     """
-    return assemble_all(plan, [genomes], feed_forward=feed_forward).first()
+    return assemble_all(plan, [genomes], feed_forward=feed_forward)
 
 
 def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
@@ -36,86 +39,208 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
     members = len(wiring.shapes)
     if any(len(team) != members for team in teams):
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
-    networks = express(wiring, [genome for team in teams for genome in team], feed_forward=feed_forward)
-    slots, evaluated, connections = (
-        each.reshape(-1, members)[:, wiring.subpopulation]
-        for each in (networks.slots, networks.evaluated, np.diff(networks.first_connection))
+    genomes = [genome for team in teams for genome in team]
+    nodes = end_to_end((genome.nodes for genome in genomes), NODE)
+    connections = end_to_end((genome.connections for genome in genomes), CONNECTION)
+    first_node = np.cumsum([0] + [len(genome.nodes) for genome in genomes])
+    first_connection = np.cumsum([0] + [len(genome.connections) for genome in genomes])
+    # Room for every gene of every module; what is left over is cut off at the end.
+    room_for_nodes, room_for_edges = (
+        int(np.diff(first).reshape(-1, members)[:, wiring.subpopulation].sum())
+        for first in (first_node, first_connection)
     )
-    bases = np.full((len(teams), len(wiring.subpopulation) + 1), wiring.observation_size)
-    bases[:, 1:] += np.cumsum(slots, axis=1)
-    # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
-    # slot still holds the previous step's value anyway.
-    copied = wiring.pin_delayed & feed_forward
-    pin_slot, link_slot, link_source = _pin_slots(wiring, bases, copied)
-    size = bases[:, -1] + link_slot.shape[1] + 1
-    output_slot = np.where(wiring.driver < 0, size[:, None] - 1, bases[:, wiring.driver] + wiring.driver_output)
-    nodes, most_edges = int(evaluated.sum()), int(connections.sum())
-    brains = Brains(
+    brains = _room(plan, len(teams), room_for_nodes, room_for_edges, len(teams) * len(wiring.pin_index))
+    brains.recurrent[:] = not feed_forward
+    _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains)
+    return brains.part(0, len(teams))
+
+
+def _room(plan: Plan, teams: int, nodes: int, edges: int, links: int) -> Brains:
+    """Brains to be filled in."""
+    counts = {"size": teams, "first_node": teams + 1, "first_link": teams + 1}
+    counts |= {"node_slot": nodes, "edge_start": nodes + 1, "activation": nodes}
+    counts |= {"edge_source": edges, "link_slot": links, "link_source": links}
+    return Brains(
         observation_size=plan.observation_size,
-        size=size,
-        recurrent=np.full(len(teams), not feed_forward),
-        first_node=np.cumsum([0, *evaluated.sum(axis=1)]),
-        first_link=np.arange(len(teams) + 1) * link_slot.shape[1],
-        node_slot=np.zeros(nodes, np.int64),
-        edge_start=np.zeros(nodes + 1, np.int64),
-        edge_source=np.zeros(most_edges, np.int64),
-        edge_weight=np.zeros(most_edges),
+        recurrent=np.zeros(teams, np.bool_),
+        edge_weight=np.zeros(edges),
         bias=np.zeros(nodes),
         response=np.zeros(nodes),
-        activation=np.zeros(nodes, np.int64),
-        link_slot=link_slot.ravel(),
-        link_source=link_source.ravel(),
-        output_slot=np.ascontiguousarray(output_slot),
+        output_slot=np.zeros((teams, plan.action_size), np.int64),
+        **{name: np.zeros(count, np.int64) for name, count in counts.items()},
     )
-    edges = _fill(wiring, networks, bases, pin_slot, brains)
-    return brains._replace(edge_source=brains.edge_source[:edges], edge_weight=brains.edge_weight[:edges])
-
-
-def _pin_slots(
-    wiring: WiringArrays, bases: NDArray[np.int64], copied: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """The slot that each pin reads, (T, P), and those that copies are made into and of, (T, L) each."""
-    # One memory layout, whatever the number of teams: compiled code is compiled for each.
-    pin_slot = np.ascontiguousarray(np.where(wiring.pin_module < 0, 0, bases[:, wiring.pin_module]) + wiring.pin_index)
-    link_source = pin_slot[:, copied]
-    link_slot = bases[:, -1:] + np.arange(np.count_nonzero(copied))
-    pin_slot[:, copied] = link_slot
-    return pin_slot, link_slot, link_source
 
 
 @compiled
-def _fill(wiring, networks, bases, pin_slot, brains):  # type: ignore[no-untyped-def]
-    """Write nodes and edges of `brains`; returns the number of edges.
+def _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains):  # type: ignore[no-untyped-def]
+    """Fill in the brains of T teams of S genomes each.
 
     Args:
         wiring: the plan, of M modules and P pins.
-        networks: of all teams.
-        bases: (T, M + 1) the first slot of each module.
-        pin_slot: (T, P) the slot that each pin reads.
-        brains: whose other fields are filled, with room for all edges.
+        nodes: (N,) genes of all genomes, team by team, each in the order of the subpopulations.
+        first_node: (T * S + 1,) the nodes of genome g are first_node[g] to first_node[g + 1].
+        connections: (C,) likewise.
+        first_connection: (T * S + 1,) likewise.
+        feed_forward: the kind of networks.
+        brains: with room for all.
     """
-    node = edge = 0
-    for t in range(bases.shape[0]):
-        for m in range(wiring.subpopulation.size):
-            g = t * wiring.hidden_is_linked.size + wiring.subpopulation[m]
-            pins = pin_slot[t, wiring.first_pin[m] : wiring.first_pin[m + 1]]
-            first_node, first_connection = networks.first_node[g], networks.first_connection[g]
-            connections = networks.connections[first_connection : networks.first_connection[g + 1]]
-            base = bases[t, m] - pins.size
-            for row in networks.order[first_node : first_node + networks.evaluated[g]]:
-                gene = networks.nodes[first_node + row]
-                brains.node_slot[node] = base + networks.slot_of[first_node + row]
-                brains.bias[node] = gene.bias
-                brains.response[node] = gene.response
-                brains.activation[node] = gene.activation
-                i = row_of(connections, gene.key, -pins.size)
-                while i < connections.size and connections[i].target == gene.key:
-                    if connections[i].enabled:
-                        source = networks.source_of[first_connection + i]
-                        brains.edge_source[edge] = pins[source] if source < pins.size else base + source
-                        brains.edge_weight[edge] = connections[i].weight
-                        edge += 1
-                    i += 1
-                node += 1
-                brains.edge_start[node] = edge
-    return edge
+    members, modules = wiring.shapes.shape[0], wiring.subpopulation.size
+    # Of the networks, gene by gene: rows in the order of evaluation, local indices of nodes and of what is read.
+    order, slot_of = np.zeros(nodes.size, np.int64), np.zeros(nodes.size, np.int64)
+    source_of = np.zeros(connections.size, np.int64)
+    evaluated, slots = np.zeros(members, np.int64), np.zeros(members, np.int64)
+    # Of one team: the first slot of each module, and the slot that each pin reads.
+    base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(wiring.pin_index.size, np.int64)
+    for t in range(brains.size.size):
+        # 1. One network per genome.
+        for s in range(members):
+            a, b = first_node[t * members + s], first_node[t * members + s + 1]
+            c, d = first_connection[t * members + s], first_connection[t * members + s + 1]
+            evaluated[s], slots[s] = _express(
+                wiring, s, nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
+            )
+        # 2. One stretch of slots per module.
+        _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains)
+        # 3. Nodes and edges; modules that share a genome each get a copy.
+        brains.first_node[t + 1] = brains.first_node[t]
+        for m in range(modules):
+            s = wiring.subpopulation[m]
+            a, c, d = (
+                first_node[t * members + s],
+                first_connection[t * members + s],
+                first_connection[t * members + s + 1],
+            )
+            rows, pins = order[a : a + evaluated[s]], pin_slot[wiring.first_pin[m] : wiring.first_pin[m + 1]]
+            _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], pins, base[m], brains)
+
+
+@compiled
+def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type: ignore[no-untyped-def]
+    """Decide where the values of team `t` are kept, and write its links and actuators.
+
+    Args:
+        wiring: the plan.
+        t: which team.
+        slots: (S,) how many each network has.
+        feed_forward: the kind of networks.
+        base: (M + 1,) overwritten: the first slot of each module; they lie behind what is sensed.
+        pin_slot: (P,) overwritten: the slot that each pin reads.
+        brains: of all teams.
+    """
+    base[0] = wiring.observation_size
+    for m in range(wiring.subpopulation.size):
+        base[m + 1] = base[m] + slots[wiring.subpopulation[m]]
+    # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
+    # slot still holds the previous step's value anyway. Copies lie behind the modules.
+    link, end = brains.first_link[t], base[-1]
+    for p in range(pin_slot.size):
+        pin_slot[p] = wiring.pin_index[p]
+        if wiring.pin_module[p] >= 0:
+            pin_slot[p] += base[wiring.pin_module[p]]
+        if feed_forward and wiring.pin_delayed[p]:
+            brains.link_slot[link], brains.link_source[link] = end, pin_slot[p]
+            pin_slot[p] = end
+            link += 1
+            end += 1
+    brains.first_link[t + 1] = link
+    # The last slot stays 0, for actuators that nobody drives.
+    brains.size[t] = end + 1
+    for k in range(wiring.driver.size):
+        module = wiring.driver[k]
+        brains.output_slot[t, k] = end if module < 0 else base[module] + wiring.driver_output[k]
+
+
+@compiled
+def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, brains):  # type: ignore[no-untyped-def]
+    """Add the nodes and edges of one module to those of team `t`.
+
+    The tables and local indices are those of its genome, `rows` those of the nodes to evaluate, in order, `pins` the
+    slots that its pins read, and `base` is its first slot.
+    """
+    node = brains.first_node[t + 1]
+    edge = brains.edge_start[node]
+    for row in rows:
+        gene = nodes[row]
+        brains.node_slot[node] = base + slot_of[row] - pins.size
+        brains.bias[node] = gene.bias
+        brains.response[node] = gene.response
+        brains.activation[node] = gene.activation
+        i = row_of(connections, gene.key, -pins.size)
+        while i < connections.size and connections[i].target == gene.key:
+            if connections[i].enabled:
+                local = source_of[i] - pins.size
+                brains.edge_source[edge] = pins[source_of[i]] if local < 0 else base + local
+                brains.edge_weight[edge] = connections[i].weight
+                edge += 1
+            i += 1
+        node += 1
+        brains.edge_start[node] = edge
+    brains.first_node[t + 1] = node
+
+
+@compiled
+def _express(wiring, s, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
+    """Make the network of one genome; returns how many nodes it evaluates and how many value slots it has.
+
+    Args:
+        wiring: the plan.
+        s: the genome's subpopulation.
+        nodes: (N,) its genes.
+        connections: (C,) its genes.
+        feed_forward: evaluate nodes in the order of their dependencies, else all at once.
+        order: (N,) overwritten: the rows of the nodes to evaluate, in order.
+        slot_of: (N,) overwritten: local index of each node's value.
+        source_of: (C,) overwritten: local index of what each connection reads.
+    """
+    inputs, hidden, outputs = wiring.shapes[s, 0], wiring.shapes[s, 1], wiring.shapes[s, 2]
+    read_outside = outputs + (hidden if wiring.hidden_is_linked[s] else 0)
+    # First the row of the node that each connection reads, or -1 - k for pin k.
+    for i in range(connections.size):
+        source = connections[i].source
+        source_of[i] = source if source < 0 else node_row(nodes, source)
+        missing = source < -inputs or (source >= 0 and source_of[i] < 0)
+        if missing or node_row(nodes, connections[i].target) < 0:
+            raise ValueError("a connection of a genome has an end that does not exist")
+    evaluated = _order(nodes, connections, source_of, read_outside, feed_forward, order)
+    slots = read_outside
+    for row in range(nodes.size):
+        slot_of[row] = inputs + nodes[row].key if nodes[row].key < read_outside else -1
+    for row in order[:evaluated]:
+        if slot_of[row] < 0:
+            slot_of[row] = inputs + slots
+            slots += 1
+    for row in range(nodes.size):
+        if slot_of[row] < 0:
+            slot_of[row] = inputs + slots
+    for i in range(connections.size):
+        source_of[i] = -1 - source_of[i] if source_of[i] < 0 else slot_of[source_of[i]]
+    return evaluated, slots + 1
+
+
+@compiled
+def _order(nodes, connections, source_of, read_outside, feed_forward, order):  # type: ignore[no-untyped-def]
+    """Write the rows of the nodes to evaluate into the head of `order`; returns how many they are.
+
+    Wanted is what other modules or actuators read, if it exists, and whatever leads there. Of a recurrent network, all
+    that are wanted and have an input. Of a feed-forward one, all that are wanted, after everything that they read;
+    those on or behind a cycle are left out.
+    """
+    wanted = nodes["key"] < read_outside
+    mark_sources(nodes, connections, wanted, True)
+    placed = np.zeros(nodes.size, np.bool_)
+    count, before = 0, -1
+    while count > before:  # until a pass over all nodes places none
+        before = count
+        edge = 0
+        for row in range(nodes.size):
+            fed, ready = False, wanted[row] and not placed[row]
+            while edge < connections.size and connections[edge].target == nodes[row].key:
+                if connections[edge].enabled:
+                    fed = True
+                    ready = ready and (not feed_forward or source_of[edge] < 0 or placed[source_of[edge]])
+                edge += 1
+            if ready and (fed or feed_forward):
+                placed[row] = True
+                order[count] = row
+                count += 1
+    return count

@@ -1,6 +1,6 @@
 """Whole brains as flat arrays, and the compiled kernel that runs them.
 
-All values live in one vector: the observation first, then the nodes of every module, then a copy of what
+All values live in one vector: what is sensed first, then the nodes of every module, then a copy of what
 links read (feed-forward brains), then a slot that stays 0. Semantics are those of neat-python's networks,
 weights and order of summation included.
 """
@@ -17,13 +17,17 @@ from numpy.typing import NDArray
 from exneat_cli.compiling import compiled_lean
 
 
-class Brain(NamedTuple):
-    """A compiled team. E edges, N nodes in the order of evaluation, L links, A actuators.
+class Brains(NamedTuple):
+    """B compiled teams for one task, laid end to end, so that one compiled call can run them all.
+
+    N nodes in the order of evaluation, E edges and L links in all; A actuators.
 
     Attributes:
-        observation_size: entries of the observation that it was wired for.
-        size: length of the value vector; its last entry stays 0.
-        recurrent: all nodes advance together from the previous step's values, else one after another.
+        observation_size: entries of what each of them senses, `Task.sensed_size`.
+        size: (B,) length of each value vector; its last entry stays 0.
+        recurrent: (B,) all nodes advance together from the previous step's values, else one after another.
+        first_node: (B + 1,) the nodes of brain b are first_node[b] to first_node[b + 1].
+        first_link: (B + 1,) its links, likewise.
         node_slot: (N,) where each node's value is kept.
         edge_start: (N + 1,) the edges of node n are edge_start[n] to edge_start[n + 1].
         edge_source: (E,) slot that each edge reads.
@@ -31,35 +35,7 @@ class Brain(NamedTuple):
         bias, response: (N,) a node's value is act(bias + response * sum).
         activation: (N,) indices into `exneat_cli.algorithms.ACTIVATIONS`.
         link_slot, link_source: (L,) at each step's start the source's old value is copied to the slot.
-        output_slot: (A,) slot that sets each actuator.
-    """
-
-    observation_size: int
-    size: int
-    recurrent: bool
-    node_slot: NDArray[np.int64]
-    edge_start: NDArray[np.int64]
-    edge_source: NDArray[np.int64]
-    edge_weight: NDArray[np.float64]
-    bias: NDArray[np.float64]
-    response: NDArray[np.float64]
-    activation: NDArray[np.int64]
-    link_slot: NDArray[np.int64]
-    link_source: NDArray[np.int64]
-    output_slot: NDArray[np.int64]
-
-
-class Brains(NamedTuple):
-    """Several brains for one task, laid end to end, so that one compiled call can run them all.
-
-    Attributes:
-        observation_size: entries of the observation that all were wired for.
-        size, recurrent: (B,) of each brain.
-        first_node, first_link: (B + 1,) the nodes of brain b are first_node[b] to first_node[b + 1], and so on.
-        node_slot, edge_start, edge_source, edge_weight, bias, response, activation: as in `Brain`, nodes and
-            edges counted through.
-        link_slot, link_source: as in `Brain`, counted through.
-        output_slot: (B, A).
+        output_slot: (B, A) slot that sets each actuator.
     """
 
     observation_size: int
@@ -78,70 +54,41 @@ class Brains(NamedTuple):
     link_source: NDArray[np.int64]
     output_slot: NDArray[np.int64]
 
-    def first(self) -> Brain:
-        """The first one, which must be the only one."""
-        own = {name: value for name, value in self._asdict().items() if name in Brain._fields}
-        recurrent = bool(self.recurrent[0])
-        return Brain(**{**own, "size": int(self.size[0]), "recurrent": recurrent, "output_slot": self.output_slot[0]})
-
     def part(self, first: int, last: int) -> Brains:
         """Those from `first` to before `last`, counted from 0 again; their arrays are views where they can be."""
-        nodes = slice(int(self.first_node[first]), int(self.first_node[last]))
+        brains, nodes = slice(first, last), slice(int(self.first_node[first]), int(self.first_node[last]))
         links = slice(int(self.first_link[first]), int(self.first_link[last]))
         edges = slice(int(self.edge_start[nodes.start]), int(self.edge_start[nodes.stop]))
-        return Brains(
-            observation_size=self.observation_size,
-            size=self.size[first:last],
-            recurrent=self.recurrent[first:last],
+        places = dict.fromkeys(("size", "recurrent", "output_slot"), brains)
+        places |= dict.fromkeys(("node_slot", "bias", "response", "activation"), nodes)
+        places |= dict.fromkeys(("edge_source", "edge_weight"), edges)
+        places |= dict.fromkeys(("link_slot", "link_source"), links)
+        return self._replace(
             first_node=self.first_node[first : last + 1] - nodes.start,
             first_link=self.first_link[first : last + 1] - links.start,
-            node_slot=self.node_slot[nodes],
             edge_start=self.edge_start[nodes.start : nodes.stop + 1] - edges.start,
-            edge_source=self.edge_source[edges],
-            edge_weight=self.edge_weight[edges],
-            bias=self.bias[nodes],
-            response=self.response[nodes],
-            activation=self.activation[nodes],
-            link_slot=self.link_slot[links],
-            link_source=self.link_source[links],
-            output_slot=self.output_slot[first:last],
+            **{name: getattr(self, name)[place] for name, place in places.items()},
         )
 
 
-def lay_out(brains: Sequence[Brain]) -> Brains:
+def lay_out(brains: Sequence[Brains]) -> Brains:
     """All of `brains` end to end.
 
     Raises:
         ValueError: there are none, or they were wired for different sizes of observation or action.
     """
-    sizes = {(brain.observation_size, len(brain.output_slot)) for brain in brains}
+    sizes = {(each.observation_size, each.output_slot.shape[1]) for each in brains}
     if len(sizes) != 1:
-        raise ValueError(
-            f"brains: expected at least one, all of one size of observation and action, got {sorted(sizes)}"
-        )
+        expected = "at least one, all of one size of observation and action"
+        raise ValueError(f"brains: expected {expected}, got {sorted(sizes)}")
 
     def joined(field: str) -> NDArray[Any]:
-        return np.concatenate([getattr(brain, field) for brain in brains])
+        columns = [getattr(each, field) for each in brains]
+        if field in ("first_node", "first_link", "edge_start"):  # positions, which are counted through
+            return np.cumsum(np.concatenate([[0], *(np.diff(column) for column in columns)]))
+        return np.concatenate(columns)
 
-    edges = np.cumsum([0] + [len(brain.edge_source) for brain in brains])
-    starts = [brain.edge_start[:-1] + first for brain, first in zip(brains, edges[:-1], strict=True)]
-    return Brains(
-        observation_size=brains[0].observation_size,
-        size=np.array([brain.size for brain in brains], np.int64),
-        recurrent=np.array([brain.recurrent for brain in brains]),
-        first_node=np.cumsum([0] + [len(brain.node_slot) for brain in brains]),
-        first_link=np.cumsum([0] + [len(brain.link_slot) for brain in brains]),
-        node_slot=joined("node_slot"),
-        edge_start=np.concatenate([*starts, edges[-1:]]),
-        edge_source=joined("edge_source"),
-        edge_weight=joined("edge_weight"),
-        bias=joined("bias"),
-        response=joined("response"),
-        activation=joined("activation"),
-        link_slot=joined("link_slot"),
-        link_source=joined("link_source"),
-        output_slot=np.stack([brain.output_slot for brain in brains]),
-    )
+    return Brains(brains[0].observation_size, *(joined(field) for field in Brains._fields[1:]))
 
 
 def memory_size(brains: Brains) -> int:
@@ -156,11 +103,13 @@ def activate(brains: Brains, b: int, memory: NDArray[np.float64], action: NDArra
     Args:
         brains: see there.
         b: which of them.
-        memory: (`memory_size`,), all 0 when an episode starts; its head is the observation of this step.
+        memory: (`memory_size`,), all 0 when an episode starts; its head is what is sensed at this step.
         action: (A,), overwritten.
     """
+    # 1. Keep what links read, before it is overwritten.
     for i in range(brains.first_link[b], brains.first_link[b + 1]):
         memory[brains.link_slot[i]] = memory[brains.link_source[i]]
+    # 2. Evaluate; new values of a recurrent brain wait behind the value vector until all are there.
     first, last = brains.first_node[b], brains.first_node[b + 1]
     recurrent, scratch = brains.recurrent[b], brains.size[b] - first
     for node in range(first, last):
@@ -172,12 +121,14 @@ def activate(brains: Brains, b: int, memory: NDArray[np.float64], action: NDArra
     if recurrent:
         for node in range(first, last):
             memory[brains.node_slot[node]] = memory[scratch + node]
+    # 3. Act.
     for i in range(action.size):
         action[i] = memory[brains.output_slot[b, i]]
 
 
 @compiled_lean
 def _activation(code, value):  # type: ignore[no-untyped-def]
+    """neat-python's functions, with its scaling and limits; `code` indexes `exneat_cli.algorithms.ACTIVATIONS`."""
     if code == 0:
         return math.tanh(max(-60.0, min(60.0, 2.5 * value)))
     if code == 1:

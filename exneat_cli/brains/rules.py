@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ACTIVATIONS
-from exneat_cli.brains.brain import Brain
+from exneat_cli.brains.brain import Brains
 from exneat_cli.tasks import Part, Task
 
 
@@ -20,7 +20,7 @@ class RandomActions(NamedTuple):
     high: NDArray[np.float64]
 
 
-def acting_by_rule(rule: str, task: Task) -> Brain | RandomActions:
+def acting_by_rule(rule: str, task: Task) -> Brains | RandomActions:
     """Who acts in a task by the rule ``random``, ``motionless`` or ``linear_fusion``."""
     if rule == "random":
         return RandomActions(*task.action_bounds)
@@ -29,12 +29,12 @@ def acting_by_rule(rule: str, task: Task) -> Brain | RandomActions:
     return linear_fusion(task.sensed_size, len(task.actuator_names), task.parts)
 
 
-def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brain:
+def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brains:
     """Does the same at every step: `resting_action`, (A,)."""
     return weighted_sums(np.zeros((len(resting_action), observation_size)), resting_action)
 
 
-def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]) -> Brain:
+def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]) -> Brains:
     """Moves to where the sum of all channels is largest.
 
     Each part's actuators get the sum of its sensors, all others 0.
@@ -45,7 +45,7 @@ def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]
     return weighted_sums(weights, np.zeros(action_size))
 
 
-def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Brain:
+def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Brains:
     """The brain whose action is ``weights @ observation + bias``.
 
     Args:
@@ -55,19 +55,21 @@ def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Br
     actions, inputs = weights.shape
     targets, sources = np.nonzero(weights)
     none = np.zeros(0, dtype=np.int64)
-    slots = inputs + np.arange(actions, dtype=np.int64)
-    return Brain(
+    slots = inputs + np.arange(actions)
+    return Brains(
         observation_size=inputs,
-        size=inputs + actions + 1,
-        recurrent=False,
+        size=np.array([inputs + actions + 1]),
+        recurrent=np.array([False]),
+        first_node=np.array([0, actions]),
+        first_link=np.array([0, 0]),
         node_slot=slots,
         edge_start=np.searchsorted(targets, np.arange(actions + 1)).astype(np.int64),
         edge_source=sources.astype(np.int64),
         edge_weight=weights[targets, sources],
         bias=np.array(bias, dtype=np.float64),
         response=np.ones(actions),
-        activation=np.full(actions, ACTIVATIONS.index("identity"), dtype=np.int64),
+        activation=np.full(actions, ACTIVATIONS.index("identity")),
         link_slot=none,
         link_source=none,
-        output_slot=slots,
+        output_slot=slots[np.newaxis],
     )

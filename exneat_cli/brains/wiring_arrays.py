@@ -16,7 +16,7 @@ class WiringArrays(NamedTuple):
     """A plan of M modules with P pins in all, S subpopulations and A actuators.
 
     Attributes:
-        observation_size: length of the observation.
+        observation_size: length of what is sensed.
         shapes: (S, 3) inputs, initial hidden nodes and outputs.
         hidden_is_linked: (S,) whether other modules read a module's initial hidden nodes.
         subpopulation: (M,) of each module.

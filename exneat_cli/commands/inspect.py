@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
-from exneat_cli.records import DONE, RUNNING, Champion, RunDirectory, find_runs, is_held, read_champion
+from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, is_held, read_champion
 from exneat_cli.wiring import Module
 
 
@@ -35,8 +34,8 @@ def _show(run: RunDirectory) -> None:
         raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
     manifest = run.read_manifest()
     if not run.champion.exists():
-        why = "a baseline has no networks" if manifest.get("variant") in BASELINES else "it is not finished"
-        raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.get('status')})")
+        why = "a baseline has no networks" if manifest.variant in BASELINES else "it is not finished"
+        raise ExneatError(f"run={run.path}: has no champion to show: {why} (status {manifest.status})")
     champion = read_champion(run.champion)
     print(f"{run.path}  ({_status(run, manifest)})")
     kind = "feed-forward" if champion.feed_forward else "recurrent"
@@ -44,14 +43,14 @@ def _show(run: RunDirectory) -> None:
     print(f"{champion.variant}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
     for module in champion.plan.modules:
         _show_module(champion, module)
-    test = champion.scores["test"]
-    print(f"test: fitness {test['fitness_mean']:.4g} (sd {test['fitness_std']:.3g}), {test['episodes']} episodes")
+    test = champion.scores.test
+    print(f"test: fitness {test.fitness_mean:.4g} (sd {test.fitness_std:.3g}), {test.episodes} episodes")
 
 
 def _show_module(champion: Champion, module: Module) -> None:
     genome = champion.genomes[module.subpopulation]
-    nodes, enabled = genome.size()
-    hidden = nodes - module.outputs
+    hidden = len(genome.nodes) - module.outputs
+    enabled = sum(connection.enabled for connection in genome.connections)
     x, y = module.position
     print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
     print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
@@ -85,17 +84,16 @@ def _list(output: Path) -> None:
         try:
             manifest = run.read_manifest()
             status = _status(run, manifest)
-            tested = manifest["result"]["champion"] if status == DONE else None
-            figure = f"{tested['fitness_mean']:.4g} (sd {tested['fitness_std']:.3g})" if tested else "-"
-            print(f"{status:<12}{manifest['seed']:>5}  {figure:>20}  {run.path}")
-        except (ExneatError, KeyError, TypeError, ValueError):
+            tested = manifest.result.champion if manifest.result else None
+            figure = f"{tested.fitness_mean:.4g} (sd {tested.fitness_std:.3g})" if tested else "-"
+            print(f"{status:<12}{manifest.seed:>5}  {figure:>20}  {run.path}")
+        except ExneatError:
             print(f"{'damaged':<12}{'?':>5}  {'-':>20}  {run.path}")
 
 
-def _status(run: RunDirectory, manifest: Mapping[str, Any]) -> str:
+def _status(run: RunDirectory, manifest: Manifest) -> str:
     """The manifest's status; a killed process cannot write its own."""
-    status = str(manifest["status"])
-    return "killed" if status == RUNNING and not is_held(run.path) else status
+    return "killed" if manifest.status == RUNNING and not is_held(run.path) else manifest.status
 
 
 def _ranges(indices: Sequence[int]) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import os
 import sys
+import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from hydra._internal.callbacks import Callbacks
@@ -21,7 +22,7 @@ from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.hydra_messages import in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import as_worker, heeding, unheard_by_children
+from exneat_cli.interruption import as_worker, launching, signal_heard
 from exneat_cli.rollouts import keep_clusters
 
 _WRITING_NOTHING = (
@@ -42,36 +43,46 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
     Raises:
         ExneatError: there is no such launcher, or it gave up; some jobs may be done by then.
     """
-    task = functools.partial(_do, work, jobs, os.getpid())
     if not line.launcher:
         with keep_clusters():  # starting one takes seconds
-            return [task({"job": k}) for k in range(len(jobs))]
+            return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
+    with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
+        return _launch(functools.partial(_do, work, jobs, Path(workplace)), len(jobs), line, Path(workplace))
+
+
+def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
+    """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
     with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
         try:
             OmegaConf.resolve(config.hydra.launcher)
             _refuse_calls(OmegaConf.to_container(config), "")
             context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())
             launcher = Plugins.instance().instantiate_launcher(context, task, config)
-            with heeding(), unheard_by_children():
-                done = launcher.launch([[f"+job={k}"] for k in range(len(jobs))], initial_job_idx=0)
+            with launching(workplace):
+                done = launcher.launch([[f"+job={k}"] for k in range(count)], initial_job_idx=0)
             return [str(each.return_value) for each in done]
         except ExneatError:
             raise
         except Exception as error:  # launchers and their libraries raise errors of many kinds
+            if signal_heard() is not None:
+                raise
             raise ExneatError(in_words(error, line.directories)) from error
 
 
-def _do(work: Callable[[Job], None], jobs: Sequence[Job], launched_by: int, config: Mapping[str, int]) -> str:
-    """Do one job, here or in another process; return why it failed, for an error may not survive the way back."""
+def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None, config: Mapping[str, int]) -> str:
+    """Do one job, here or in a worker; return why it failed, for an error may not survive the way back."""
     job = jobs[config["job"]]
     try:
-        with contextlib.nullcontext() if os.getpid() == launched_by else as_worker(), heeding():
+        with contextlib.nullcontext() if workplace is None else as_worker(workplace):
             work(job)
-    except ExneatError as error:
-        reason = str(error)
     except Exception as error:
-        traceback.print_exc()
-        reason = f"{type(error).__name__}: {error}"
+        if signal_heard() is not None:
+            raise KeyboardInterrupt from error
+        if isinstance(error, ExneatError):
+            reason = str(error)
+        else:
+            traceback.print_exc()
+            reason = f"{type(error).__name__}: {error}"
     else:
         return ""
     print(f"exneat: {job.name}: {reason}", file=sys.stderr, flush=True)

@@ -8,18 +8,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from exneat_cli.analysis.artefacts import Built
-from exneat_cli.analysis.catalogue import FigurePlan, Panel, TablePlan, read_catalogue
-from exneat_cli.analysis.comparisons import build_comparison
+from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel, TablePlan, read_catalogue
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
-from exneat_cli.analysis.tables import build_table
+from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
 from exneat_cli.commands.experiments import Experiment, experiment_names, plan_jobs, read_experiment
 from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.errors import ExneatError, check_choice, check_text
-from exneat_cli.records import DONE, RunDirectory, build
+from exneat_cli.records import RunDirectory, build
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis")
@@ -158,7 +156,7 @@ def _largest_budget(experiment: Experiment, output: str) -> str:
         for condition in experiment.conditions:
             folder = Path(output) / f"{experiment.name}-{condition}-{budget}"
             runs = (RunDirectory(path.parent) for path in folder.glob("*/manifest.json"))
-            if any(run.read_manifest().get("status") == DONE for run in runs):
+            if any(run.is_finished() for run in runs):
                 return budget
     return next(budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
 

@@ -12,6 +12,7 @@ from exneat_cli.commands.experiments import plan_jobs, read_experiment
 from exneat_cli.commands.jobs import Job
 from exneat_cli.commands.launching import run_jobs
 from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import DONE
 from exneat_cli.runs import Progress, progress_for_terminal
 
@@ -37,7 +38,7 @@ def run(line: CommandLine) -> int:
         if pending:
             reasons = run_jobs(functools.partial(_do, jobs, len(pending), time.time(), line), pending, line)
     except ExneatError as error:
-        if not any(job.is_finished() for job in pending):
+        if signal_heard() is not None or not any(job.is_finished() for job in pending):
             raise
         # A launcher gives up when one of its processes is killed: what was done by then counts.
         print(f"exneat: {error}", file=sys.stderr)
@@ -61,7 +62,7 @@ def _do(jobs: Sequence[Job], pending: int, began: float, line: CommandLine, job:
     seconds = (time.time() - began) / max(1, pending - left) * left
     when = f"about {seconds / 60:.0f} min" if seconds >= 90 else f"about {seconds:.0f} s"
     task = job.settings.task
-    fitness = f"{task.fitness_name} {finished.result['champion']['fitness_mean']:.{task.fitness_decimals}f}"
+    fitness = f"{task.fitness_name} {finished.result.champion.fitness_mean:.{task.fitness_decimals}f}"
     counted = f"[{len(jobs) - left:>{len(str(len(jobs)))}}/{len(jobs)}]"
     took = f"in {time.time() - started:.1f} s" + (f", {when} left" if left else "")
     print(f"{counted} {job.name}: {fitness} {took}", flush=True)
@@ -78,6 +79,6 @@ def _unfinished_because(job: Job) -> str:
         manifest = directory.read_manifest()
     except ExneatError as error:
         return str(error)
-    if manifest.get("status") == DONE:
+    if manifest.status == DONE:
         return "it was trained, but not tested at every level"
-    return str(manifest.get("error", f"it did not finish (status {manifest.get('status')})"))
+    return manifest.error or f"it did not finish (status {manifest.status})"

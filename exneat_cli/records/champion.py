@@ -1,82 +1,155 @@
-"""champion.json and hall_of_fame.jsonl: teams as plain data, readable without exneat."""
+"""champion.json and hall_of_fame.jsonl: teams as data, readable without exneat; what they hold is in docs/champion.md.
+
+A champion may come from a stranger: nothing in it is run, and compiled code may trust what `read_champion` returns.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from exneat_cli.algorithms import ArrayGenome, Candidate, genome_from_data, genome_to_data
-from exneat_cli.brains import Brain, assemble
-from exneat_cli.records.champion_data import FORMAT, plan_from_data, read_champion_data
-from exneat_cli.records.files import write_json, write_whole
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from exneat_cli.algorithms import ACTIVATIONS, ArrayGenome, Candidate
+from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
+from exneat_cli.algorithms.neat.soundness import check_genes, check_genome
+from exneat_cli.brains import Brains, assemble
+from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
+from exneat_cli.records.files import write_whole
+from exneat_cli.records.manifest import Score
+from exneat_cli.records.plain import Real, Word, build, converted, read_json
 from exneat_cli.wiring import Plan
 
+CHAMPION_FORMAT = 2
+_LARGEST, _MOST_MODULES = 1_000_000, 1000
+_Id = Annotated[int, Meta(ge=0, le=2**62)]
 
-@dataclass(frozen=True)
-class Champion:
+
+class Node(Struct, frozen=True, forbid_unknown_fields=True):
+    """An output, from 0 on, or a hidden node: activation(bias + response * sum of weighted inputs)."""
+
+    id: _Id
+    bias: Real
+    response: Real
+    activation: Annotated[str, Meta(pattern=rf"^({'|'.join(ACTIVATIONS)})\Z")]
+
+
+class Connection(Struct, frozen=True, forbid_unknown_fields=True, rename={"source": "from", "target": "to"}):
+    """From a node, or from pin k as -1 - k, to a node."""
+
+    source: Annotated[int, Meta(ge=-_LARGEST, le=2**62)]
+    target: _Id
+    weight: Real
+    enabled: bool
+    innovation: _Id
+
+
+class Genome(Struct, frozen=True, forbid_unknown_fields=True):
+    """The network of all modules of one subpopulation."""
+
+    id: _Id
+    nodes: Annotated[tuple[Node, ...], Meta(min_length=1, max_length=_LARGEST)]
+    connections: Annotated[tuple[Connection, ...], Meta(max_length=_LARGEST)]
+
+    @classmethod
+    def of(cls, genome: ArrayGenome) -> Genome:
+        """What `in_arrays` gives back."""
+        nodes = [Node(key, bias, response, ACTIVATIONS[a]) for key, bias, response, a in genome.nodes.tolist()]
+        connections = [
+            Connection(source, target, weight, bool(enabled), innovation)
+            for target, source, innovation, weight, enabled in genome.connections.tolist()
+        ]
+        return cls(genome.key, tuple(nodes), tuple(connections))
+
+    def in_arrays(self) -> ArrayGenome:
+        """The genome as algorithms and brains know it.
+
+        Raises:
+            ValueError: a node or connection comes twice, or a connection has an end that does not exist.
+        """
+        genome = ArrayGenome(self.id)
+        nodes = [(each.id, each.bias, each.response, ACTIVATIONS.index(each.activation)) for each in self.nodes]
+        connections = [(c.target, c.source, c.innovation, c.weight, c.enabled) for c in self.connections]
+        genome.nodes, genome.connections = np.array(sorted(nodes), NODE), np.array(sorted(connections), CONNECTION)
+        check_genes(genome.key, genome.nodes, genome.connections)
+        return genome
+
+
+class Scores(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """How a champion did; one that is put together by hand may do without the first two."""
+
+    training: dict[Word, Real] | None = None
+    validation: Score | None = None
+    test: Score
+
+
+class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The team that a run hands over.
 
     Attributes:
         variant: what was trained, e.g. ``exneat-all-none``.
         task: the task's parameters.
         actuators: names of the entries of the action.
-        feed_forward: the kind of networks.
+        feed_forward: the kind of networks; else recurrent ones.
+        scores: in training, validation and test.
         plan: who senses and drives what.
         genomes: one per subpopulation.
-        scores: training, validation and test figures.
     """
 
-    variant: str
-    task: dict[str, Any]
-    actuators: tuple[str, ...]
+    format: int = CHAMPION_FORMAT
+    variant: Word
+    task: dict[Word, Any]
+    actuators: Annotated[tuple[Word, ...], Meta(max_length=_LARGEST)]
     feed_forward: bool
+    scores: Scores
     plan: Plan
-    genomes: tuple[ArrayGenome, ...]
-    scores: dict[str, Any]
+    genomes: tuple[Genome, ...]
 
-    def brain(self) -> Brain:
+    def brain(self) -> Brains:
         """The runnable network."""
-        return assemble(self.plan, self.genomes, feed_forward=self.feed_forward)
-
-
-def write_champion(path: Path, champion: Champion) -> None:
-    """Write a champion.
-
-    Raises:
-        ExneatError: the file cannot be written.
-    """
-    content = {
-        "format": FORMAT,
-        "variant": champion.variant,
-        "task": champion.task,
-        "actuators": champion.actuators,
-        "feed_forward": champion.feed_forward,
-        "scores": champion.scores,
-        "plan": asdict(champion.plan),
-        "genomes": [genome_to_data(genome) for genome in champion.genomes],
-    }
-    write_json(path, content)
+        return assemble(self.plan, [genome.in_arrays() for genome in self.genomes], feed_forward=self.feed_forward)
 
 
 def read_champion(path: Path) -> Champion:
-    """Read a champion as data: nothing in the file is run.
+    """Read a champion, whose parts fit together.
 
     Raises:
-        ExneatError: see `read_champion_data`.
+        ExneatError: the file is missing or damaged, of another format, or a field is missing, unknown or unusable.
     """
-    content = read_champion_data(path)
-    return Champion(
-        variant=content["variant"],
-        task=content["task"],
-        actuators=tuple(content["actuators"]),
-        feed_forward=content["feed_forward"],
-        plan=plan_from_data(content["plan"]),
-        genomes=tuple(genome_from_data(genome) for genome in content["genomes"]),
-        scores=content["scores"],
-    )
+    champion, content = read_json(path, Champion, CHAMPION_FORMAT)
+    try:
+        build(Plan, content["plan"], "plan.")  # msgspec knows its types, and lets unknown fields of dataclasses pass
+        _check(champion)
+    except (ExneatError, ValueError) as error:
+        raise ExneatError(f"{path}: damaged: {error}") from error
+    return champion
+
+
+def _check(champion: Champion) -> None:
+    """Refuse what types cannot: sizes out of bounds, and parts that do not fit together."""
+    plan, genomes = champion.plan, champion.genomes
+    check_whole("plan.observation_size", plan.observation_size, 1, _LARGEST)
+    check_whole("plan.action_size", plan.action_size, len(champion.actuators), len(champion.actuators))
+    check_whole("number of modules", len(plan.modules), 1, _MOST_MODULES)
+    for k, module in enumerate(plan.modules):
+        key = f"plan.modules[{k}]"
+        converted(module.name, Word, f"{key}.name")
+        check_whole(f"{key}.outputs", module.outputs, 1, _LARGEST)
+        check_whole(f"{key}.hidden", module.hidden, 0, _LARGEST)
+        for coordinate in module.position:
+            check_real(f"{key}.position", coordinate, -1e6, 1e6)
+        for p, pin in enumerate(module.pins):
+            check_whole(f"{key}.pins[{p}].module", pin.module, -1, len(plan.modules) - 1)
+    plan.check()
+    shapes = plan.subpopulation_shapes
+    if len(genomes) != len(shapes):
+        raise ConfigError("genomes", f"{len(shapes)} of them, one for each subpopulation", len(genomes))
+    for genome, (inputs, _, outputs) in zip(genomes, shapes, strict=True):
+        check_genome(genome.in_arrays(), inputs, outputs, feed_forward=champion.feed_forward)
 
 
 def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[float]) -> None:
@@ -92,16 +165,13 @@ def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Seq
     """
     ranked = sorted(zip(entries, validation, strict=True), key=lambda pair: -pair[1])
     lines = [
-        json.dumps(
-            {
-                "rank": rank,
-                "generation": entry.generation + 1,
-                "training_fitness": entry.fitness,
-                "validation_fitness": score,
-                "genomes": [genome_to_data(genome) for genome in entry.team.genomes],
-            },
-            allow_nan=False,
-        )
+        {
+            "rank": rank,
+            "generation": entry.generation + 1,
+            "training_fitness": entry.fitness,
+            "validation_fitness": score,
+            "genomes": [msgspec.to_builtins(Genome.of(genome)) for genome in entry.team.genomes],
+        }
         for rank, (entry, score) in enumerate(ranked, start=1)
     ]
-    write_whole(path, "".join(line + "\n" for line in lines))
+    write_whole(path, "".join(json.dumps(line, allow_nan=False) + "\n" for line in lines))

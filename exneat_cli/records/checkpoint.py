@@ -1,7 +1,7 @@
 """Checkpoints: the state of an unfinished run, as data.
 
-One NPZ file per checkpoint, without pickles: columns of numbers, one member of JSON, and a SHA-256 digest of all
-the others. A file that is damaged in any way is passed over for the one before it.
+One NPZ file per checkpoint, without pickles: columns of numbers and one member of JSON, and behind the archive its
+SHA-256 digest. A file that is damaged in any way is passed over for the one before it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ KEPT = 2
 """The newest one, and one to fall back to."""
 _LARGEST = 16 * 1024**3
 _NAME = re.compile(r"checkpoint-(\d{6,9})\.npz")
-_STATE, _DIGEST = "state", "digest"
+_STATE, _DIGEST_SIZE = "state", hashlib.sha256().digest_size
 
 
 class Checkpoint(NamedTuple):
@@ -56,18 +56,21 @@ def write_checkpoint(directory: Path, checkpoint: Checkpoint, configuration_hash
         ValueError: a number is not finite.
     """
     head = {"format": FORMAT, "configuration_hash": configuration_hash, "generation": checkpoint.generation}
-    text = json.dumps({**head, **checkpoint.plain}, allow_nan=False)
-    members = {**checkpoint.arrays, _STATE: np.frombuffer(text.encode(), np.uint8)}
+    state = {**head, **checkpoint.plain}
     buffer = io.BytesIO()
-    np.savez(buffer, **members, **{_DIGEST: np.frombuffer(_digest(members), np.uint8)})  # type: ignore[arg-type]
-    write_whole(directory / f"checkpoint-{checkpoint.generation:06d}.npz", buffer.getvalue())
-    kept = 0
-    for path, generation in _found(directory):
-        # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
-        if generation > checkpoint.generation or kept == KEPT:
+    text = np.frombuffer(json.dumps(state, allow_nan=False).encode(), np.uint8)
+    np.savez(buffer, **checkpoint.arrays, **{_STATE: text})  # type: ignore[arg-type]
+    write_whole(directory / f"checkpoint-{checkpoint.generation:06d}.npz", with_digest(buffer.getvalue()))
+    # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
+    kept = [path for path, generation in _found(directory) if generation <= checkpoint.generation][:KEPT]
+    for path, _ in _found(directory):
+        if path not in kept:
             delete(path)
-        else:
-            kept += 1
+
+
+def with_digest(archive: bytes) -> bytes:
+    """The bytes with their digest behind them; readers of ZIP files pass over what follows the archive."""
+    return archive + hashlib.sha256(archive).digest()
 
 
 def read_checkpoints(directory: Path, configuration_hash: str) -> Iterator[Checkpoint | str]:
@@ -91,39 +94,25 @@ def _found(directory: Path) -> list[tuple[Path, int]]:
 
 
 def _read(path: Path, generation: int, configuration_hash: str) -> Checkpoint:
+    data = read_bytes(path, _LARGEST)
     try:
-        members = _members(read_bytes(path, _LARGEST))
-        if members.pop(_DIGEST).tobytes() != _digest(members):
-            raise ValueError("its digest is not that of its content")
-        plain = json.loads(members.pop(_STATE).tobytes())
-    except _DAMAGE as error:
+        arrays = _arrays(data)
+        plain = dict(json.loads(arrays.pop(_STATE).tobytes()))
+    except Exception as error:  # NumPy's and the ZIP reader's errors on bytes of any kind are of every class
         raise ExneatError(f"{path}: damaged: {error or type(error).__name__}") from error
     head = {"format": FORMAT, "configuration_hash": configuration_hash, "generation": generation}
     for key, expected in head.items():
-        if not isinstance(plain, dict) or plain.pop(key, None) != expected:
+        if plain.pop(key, None) != expected:
             raise ExneatError(f"{path}: its {key} is not {expected}: it belongs to another run or version")
-    return Checkpoint(generation, plain, members)
+    return Checkpoint(generation, plain, arrays)
 
 
-_DAMAGE = (
-    *(OSError, EOFError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, SyntaxError),
-    *(RecursionError, MemoryError, NotImplementedError, RuntimeError, zipfile.BadZipFile),
-)
-"""What reading bytes of any kind as NPZ and JSON may end in."""
-
-
-def _members(data: bytes) -> dict[str, NDArray[Any]]:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
+    archive, digest = data[:-_DIGEST_SIZE], data[-_DIGEST_SIZE:]
+    if hashlib.sha256(archive).digest() != digest:
+        raise ValueError("its digest is not that of its content")
+    with zipfile.ZipFile(io.BytesIO(archive)) as members:
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in members.infolist()):
             raise ValueError("a member is compressed, which exneat never does")
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
-
-
-def _digest(members: Mapping[str, NDArray[Any]]) -> bytes:
-    digest = hashlib.sha256()
-    for name in sorted(members):
-        column = members[name]
-        digest.update(f"{name} {column.dtype.str} {column.shape}\n".encode())
-        digest.update(np.ascontiguousarray(column).tobytes())
-    return digest.digest()
+    with np.load(io.BytesIO(archive), allow_pickle=False) as columns:
+        return dict(columns)

@@ -6,19 +6,16 @@ import contextlib
 import csv
 import io
 import json
-import math
 import os
-import re
 import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import finishing
 
 _LARGEST_TEXT = 64 * 1024**2
-_TEMPORARY = re.compile(r"\..+\.(\d{1,10})\.tmp")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -28,41 +25,22 @@ def write_whole(path: Path, content: str | bytes) -> None:
         ExneatError: the disk is full, the directory is gone or not writable.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    with finishing():
-        try:
-            with temporary.open("wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except OSError as error:
-            delete(temporary)
-            raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+    try:
+        with temporary.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+    finally:
+        delete(temporary)
 
 
 def delete(path: Path) -> None:
     """Delete a file that may be there; one that cannot be deleted stays."""
     with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
-
-
-def delete_orphans(directory: Path) -> None:
-    """Delete temporary files of processes that were killed while they wrote there."""
-    for path in directory.glob(".*.tmp"):
-        maker = _TEMPORARY.fullmatch(path.name)
-        if maker and not _is_alive(int(maker[1])):
-            delete(path)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return process != os.getpid()
 
 
 def make_directory(path: Path) -> None:
@@ -73,18 +51,22 @@ def make_directory(path: Path) -> None:
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise ExneatError(f"{path}: expected a directory, got a file") from error
     except OSError as error:
-        raise ExneatError(f"{path}: cannot be made: {error.strerror}") from error
+        fix = "set output= to a directory that you can write to"
+        raise ExneatError(f"{path}: the directory cannot be made: {error.strerror}\n  {fix}") from error
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write JSON for people: indented, keys in the order given, NaN refused.
+    """Write plain data or structs as JSON for people: indented, keys in the order given, NaN refused.
 
     Raises:
         ExneatError: the file cannot be written.
         ValueError: a number is not finite.
     """
-    write_whole(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    text = json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False, ensure_ascii=False)
+    write_whole(path, f"{text}\n".encode(errors="replace"))  # an argument of the command line may be no UTF-8
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -124,7 +106,8 @@ def read_bytes(path: Path, largest: int) -> bytes:
     try:
         kind = path.stat()
         if not stat.S_ISREG(kind.st_mode):
-            raise ExneatError(f"{path}: could not be read: expected a file, got {_kind_of(kind.st_mode)}")
+            came = "a directory" if stat.S_ISDIR(kind.st_mode) else "a pipe or device"
+            raise ExneatError(f"{path}: could not be read: expected a file, got {came}")
         if kind.st_size > largest:
             raise ExneatError(f"{path}: expected at most {largest} bytes, got {kind.st_size}")
         return path.read_bytes()
@@ -132,47 +115,3 @@ def read_bytes(path: Path, largest: int) -> bytes:
         raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
     except ValueError as error:
         raise ExneatError(f"{str(path)!r}: could not be read: {error}") from error
-
-
-def _kind_of(mode: int) -> str:
-    return "a directory" if stat.S_ISDIR(mode) else "a pipe or device"
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read one JSON object.
-
-    Raises:
-        ExneatError: the file is missing, unreadable, or no JSON object; a key comes twice, or a number is not finite.
-    """
-    text = read_text(path)
-    try:
-        content = json.loads(
-            text, object_pairs_hook=_without_twins, parse_constant=_no_constant, parse_float=_finite_float
-        )
-    except RecursionError as error:
-        raise ExneatError(f"{path}: expected JSON, got something nested too deeply") from error
-    except ValueError as error:
-        raise ExneatError(f"{path}: expected JSON, got something else: {error}") from error
-    if not isinstance(content, dict):
-        raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
-    return content
-
-
-def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(pairs)
-    if len(content) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twin = next(key for k, key in enumerate(keys) if key in keys[:k])
-        raise ValueError(f"the key {twin[:60]!r} comes twice")
-    return content
-
-
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number")
-
-
-def _finite_float(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"the number {text[:40]} is too large")
-    return number

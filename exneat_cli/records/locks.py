@@ -12,7 +12,7 @@ from pathlib import Path
 from exneat_cli.errors import ExneatError
 
 _TRIES, _PAUSE = 3, 0.02
-"""How often a lock is asked for, and the seconds in between."""
+"""How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
 _KERNEL_LOCKS = Path("/proc/locks")
 
 
@@ -30,14 +30,7 @@ def held(directory: Path) -> Iterator[None]:
     except OSError as error:
         raise ExneatError(f"{directory}: cannot be opened: {error.strerror}") from error
     try:
-        try:
-            _lock(descriptor)
-        except BlockingIOError:
-            process = _holder(descriptor) or "unknown"
-            raise ExneatError(f"{directory}: another process is writing there (process id {process})") from None
-        except OSError as error:
-            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that knows flock"
-            raise ExneatError(why) from error
+        _lock(directory, descriptor)
         if not _is_still(directory, descriptor):
             raise ExneatError(f"{directory}: was removed by another process at this moment; try again")
         yield
@@ -45,46 +38,41 @@ def held(directory: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _lock(descriptor: int) -> None:
-    """Take the lock; whoever only asks by `is_held` has it for less than a moment, so a second try is worth it."""
-    for _ in range(_TRIES - 1):
-        with contextlib.suppress(BlockingIOError):
+def _lock(directory: Path, descriptor: int) -> None:
+    for attempt in range(1, _TRIES + 1):
+        try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return
-        time.sleep(_PAUSE)
-    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if attempt == _TRIES:
+                holder = f"process id {_holder(descriptor)}"
+                raise ExneatError(f"{directory}: another process is writing there ({holder})") from None
+            time.sleep(_PAUSE)
+        except OSError as error:
+            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that knows flock"
+            raise ExneatError(why) from error
+
+
+def _is_still(directory: Path, descriptor: int) -> bool:
+    with contextlib.suppress(OSError):
+        return os.path.samestat(os.stat(directory), os.fstat(descriptor))
+    return False
 
 
 def is_held(directory: Path) -> bool:
     """Whether a process holds the directory now."""
     try:
-        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError as error:
-        return isinstance(error, BlockingIOError)
-    finally:
-        os.close(descriptor)
-    return False
+        with held(directory):
+            return False
+    except ExneatError:
+        return True
 
 
-def _is_still(directory: Path, descriptor: int) -> bool:
-    try:
-        return os.path.samestat(os.stat(directory), os.fstat(descriptor))
-    except OSError:
-        return False
-
-
-def _holder(descriptor: int) -> int | None:
-    """Id of the process that holds the lock; None where the kernel does not tell."""
-    inode = os.fstat(descriptor).st_ino
-    try:
-        lines = _KERNEL_LOCKS.read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    for fields in (line.split() for line in lines):
-        if "FLOCK" in fields and "->" not in fields and fields[-3].endswith(f":{inode}"):
-            return int(fields[-4])
-    return None
+def _holder(descriptor: int) -> str:
+    """Id of the process that holds the lock, where the kernel tells."""
+    with contextlib.suppress(OSError):
+        inode = os.fstat(descriptor).st_ino
+        for fields in map(str.split, _KERNEL_LOCKS.read_text(encoding="ascii").splitlines()):
+            if "FLOCK" in fields and "->" not in fields and fields[-3].endswith(f":{inode}"):
+                return fields[-4]
+    return "unknown"

@@ -1,30 +1,109 @@
-"""From plain data, such as YAML gives, to frozen dataclasses, which check types and ranges themselves."""
+"""From plain data, as JSON and YAML give it, to typed values, or to one line that says what does not fit."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, TypeVar
+import re
+import sys
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from exneat_cli.errors import ExneatError, check_keys, check_section
+import msgspec
+from msgspec import Meta
 
-_T = TypeVar("_T")
+from exneat_cli.errors import ExneatError, check_keys, check_section, shortened
+from exneat_cli.records.files import read_text
+
+Word = Annotated[str, Meta(pattern=r"^[\w -~]{1,200}\Z")]
+"""Letters of any script, digits, and what ASCII can print."""
+Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+"""Finite."""
+Count = Annotated[int, Meta(ge=0)]
+
+_Kind = TypeVar("_Kind")
+_NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text"}
+_NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
+"""Ours for msgspec's types."""
 
 
-def build(cls: type[_T], values: Mapping[str, Any], prefix: str) -> _T:
-    """Build a dataclass from keys with values.
+def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
+    """Read a JSON object that has a field ``format``; returns it typed, and as it was.
 
     Args:
-        cls: the dataclass.
-        values: of its fields.
-        prefix: what stands before its keys in messages, e.g. ``task.``.
+        path: of the file.
+        kind: a `msgspec.Struct`.
+        version: the format that this version of exneat reads.
 
     Raises:
-        ExneatError: `values` are no section, a key is unknown or missing, or the dataclass refuses a value.
+        ExneatError: the file is missing, unreadable, no JSON object or of another format, or a field is missing,
+            unknown or unusable.
     """
-    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-    check_keys(prefix, check_section(prefix.rstrip("."), values), [f.name for f in fields])
-    for f in fields:
-        if f.name not in values and f.default is f.default_factory is dataclasses.MISSING:
-            raise ExneatError(f"{prefix}{f.name}: is missing")
-    return cls(**values)
+    try:
+        content = msgspec.json.decode(read_text(path))
+    except RecursionError as error:
+        raise ExneatError(f"{path}: expected JSON, got something nested too deeply") from error
+    except msgspec.DecodeError as error:
+        raise ExneatError(f"{path}: expected JSON, got something else: {error}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
+    came = content.get("format")
+    if came != version or isinstance(came, bool):
+        why = "another version of exneat wrote it" if came else "exneat did not write it"
+        raise ExneatError(f"{path}: expected format {version}, got {shortened(came)}: {why}")
+    return converted(content, kind, f"{path}: damaged"), content
+
+
+def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = True) -> _Kind:
+    """Plain data as `kind`, which is whatever `msgspec.convert` knows.
+
+    Args:
+        content: from a file.
+        kind: what it should be.
+        where: begins the message.
+        strict: without it, text that reads as a number is one, as in CSV files.
+
+    Raises:
+        ExneatError: it does not fit; names the field, what was expected and what came.
+    """
+    try:
+        return msgspec.convert(content, kind, strict=strict)
+    except msgspec.ValidationError as error:
+        text, _, place = str(error).partition(" - at `$")
+        place = place.removesuffix("`")
+        said = re.sub(r"`([^`]+)`", lambda found: " or ".join(_NAMES.get(n, n) for n in found[1].split(" | ")), text)
+        said = "".join(filter(str.isprintable, said[:1].lower() + said[1:]))[:200]
+        if said.startswith("expected"):
+            for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", place.partition("[...]")[0]):
+                content = content[name or int(index)]
+            said = f"{said.partition(', got ')[0]}, got {shortened(content)}"
+        raise ExneatError(": ".join(part for part in (where, place.lstrip("."), said) if part)) from error
+
+
+def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
+    """Make a dataclass of plain data; fields that are dataclasses, or tuples of them, are made of theirs.
+
+    Args:
+        kind: the dataclass; it checks its own values.
+        values: a mapping by field; what is a dataclass already stays as it is.
+        prefix: of the keys in messages, e.g. ``noise.``.
+
+    Raises:
+        ConfigError: `values` is no mapping, or whatever `kind` says of them.
+        ExneatError: a key is unknown, named with the nearest valid one, or missing.
+    """
+    section = check_section(prefix.rstrip("."), values)
+    fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    check_keys(prefix, section, fields)
+    for name, field in fields.items():
+        if name not in section and field.default is field.default_factory is dataclasses.MISSING:
+            raise ExneatError(f"{prefix}{name}: is missing")
+    hints = get_type_hints(kind)
+    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in section.items()})
+
+
+def _made(hint: Any, value: Any, key: str) -> Any:
+    if dataclasses.is_dataclass(hint) and not dataclasses.is_dataclass(value):
+        return build(hint, value, f"{key}.")  # type: ignore[arg-type]
+    if get_origin(hint) is tuple and dataclasses.is_dataclass(get_args(hint)[0]) and isinstance(value, list | tuple):
+        return tuple(_made(get_args(hint)[0], each, f"{key}[{k}]") for k, each in enumerate(value))
+    return value

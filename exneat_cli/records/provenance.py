@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import subprocess
 from importlib.metadata import version
@@ -14,32 +15,27 @@ _PACKAGES = ("neat-python", "numpy", "numba", "gymnasium", "mujoco", "hydra-core
 
 def versions() -> dict[str, str]:
     """Versions of exneat, Python and the libraries that results depend on."""
-    return {
-        "exneat": exneat_cli.__version__,
-        "python": platform.python_version(),
-        **{package: version(package) for package in _PACKAGES},
-    }
+    packages = {package: version(package) for package in _PACKAGES}
+    return {"exneat": exneat_cli.__version__, "python": platform.python_version(), **packages}
 
 
 def processor() -> str:
     """The processor's name as the system tells it."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
+    return _told("/proc/cpuinfo", "model name") or platform.processor() or platform.machine()
 
 
 def available_memory() -> int | None:
     """Bytes of memory that a new process may take without others being swapped out; None where it is not told."""
-    try:
-        for line in Path("/proc/meminfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    except OSError:
-        pass
+    told = _told("/proc/meminfo", "MemAvailable")
+    return int(told.split()[0]) * 1024 if told else None
+
+
+def _told(path: str, name: str) -> str | None:
+    """The value behind the first such name in one of the kernel's files."""
+    with contextlib.suppress(OSError):
+        for line in Path(path).read_text(encoding="utf-8").splitlines():
+            if line.startswith(name):
+                return line.partition(":")[2].strip()
     return None
 
 
@@ -48,14 +44,8 @@ def git_commit() -> str | None:
     root = Path(exneat_cli.__file__).parents[1]
     if not (root / ".git").exists():
         return None
+    command = ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
     try:
-        commit = subprocess.run(
-            ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"],
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return None
-    return commit.stdout.strip()

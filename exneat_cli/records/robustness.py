@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-import math
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import write_csv
+from exneat_cli.errors import ExneatError, shortened
+from exneat_cli.records.files import read_text, write_csv
+from exneat_cli.records.plain import Count, Real, converted
 
 UNPERTURBED = "none"
 """Parameter of the row that tells how a baseline does when nothing is perturbed."""
@@ -28,14 +29,14 @@ class RobustnessRow(NamedTuple):
     """
 
     variant: str
-    run_seed: int
+    run_seed: Count
     parameter: str
-    level: float
-    episodes: int
-    fitness_mean: float
-    fitness_std: float
-    full_reward_mean: float
-    full_reward_std: float
+    level: Real
+    episodes: Count
+    fitness_mean: Real
+    fitness_std: Real
+    full_reward_mean: Real
+    full_reward_std: Real
 
 
 def read_robustness(path: Path) -> list[RobustnessRow]:
@@ -47,21 +48,12 @@ def read_robustness(path: Path) -> list[RobustnessRow]:
     if not path.exists():
         return []
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
-        if not rows or tuple(rows[0]) != RobustnessRow._fields:
-            raise ValueError("other columns")
-        return [_row(values) for values in rows[1:]]
-    except (OSError, ValueError, TypeError) as error:
-        raise ExneatError(f"{path}: expected a table of {', '.join(RobustnessRow._fields)}: {error}") from error
-
-
-def _row(values: Sequence[str]) -> RobustnessRow:
-    variant, seed, parameter, level, episodes, *figures = values
-    numbers = [float(figure) for figure in figures]
-    if not all(math.isfinite(number) for number in (float(level), *numbers)):
-        raise ValueError(f"a number is not finite in the row of {parameter} {level}")
-    return RobustnessRow(variant, int(seed), parameter, float(level), int(episodes), *numbers)
+        columns, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
+        if tuple(columns) != RobustnessRow._fields:
+            raise ValueError(f"the columns {shortened(columns)}")
+    except (csv.Error, ValueError) as error:
+        raise ExneatError(f"{path}: expected a table of {', '.join(RobustnessRow._fields)}, got {error}") from error
+    return converted(rows, list[RobustnessRow], f"{path}: damaged, at [row][column]", strict=False)
 
 
 def merge_robustness(path: Path, rows: Sequence[RobustnessRow]) -> None:

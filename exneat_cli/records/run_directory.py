@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-import enum
 import hashlib
 import json
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from glob import glob
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, delete_orphans, write_json, write_whole
+from exneat_cli.records.files import delete, make_directory, write_json, write_whole
 from exneat_cli.records.locks import held
-from exneat_cli.records.manifest_data import DONE, read_manifest_data, result_of
+from exneat_cli.records.manifest import DONE, MANIFEST_FORMAT, Manifest, Result
+from exneat_cli.records.plain import read_json
 from exneat_cli.records.yaml_files import read_yaml
 
-MANIFEST_FORMAT = 3
-
-_WITHOUT_EFFECT = ("executor", "output", "name", "resume", "checkpoint_every")
-"""Settings that say where and how to run, not what comes out."""
-_NOT_HASHED = (*_WITHOUT_EFFECT, "generations")
-"""A run may be made longer, so its length is no part of what it is."""
-
-
-class Claim(enum.Enum):
-    """What is to be done in a run directory."""
-
-    BEGIN = "begin"
-    CONTINUE = "continue"
-    FINISHED = "finished"
+_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
+"""Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
+_ELSEWHERE = "  remove it, or set name= or output= to another place"
 
 
 def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
@@ -41,86 +33,64 @@ def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = Tr
         configuration: all settings of a run, as plain data.
         with_seed: without it, the seeds of one variant share a hash.
     """
-    kept = _that_matter(configuration, _NOT_HASHED if with_seed else (*_NOT_HASHED, "seed"))
-    return hashlib.sha256(json.dumps(kept, sort_keys=True, allow_nan=False).encode()).hexdigest()
+    kept = {key: value for key, value in _identity(configuration).items() if with_seed or key != "seed"}
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
-def _that_matter(configuration: Mapping[str, Any], ignored: Sequence[str]) -> dict[str, Any]:
-    return {key: _canonical(value) for key, value in configuration.items() if key not in ignored}
-
-
-def _flat(plain: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """The same with dotted keys."""
-    flat: dict[str, Any] = {}
-    for key, value in plain.items():
-        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+def _identity(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that are hashed, by dotted key, with 1.0 written as 1: a number is the same however it was typed."""
+    kept = {key: value for key, value in configuration.items() if key not in _NOT_HASHED}
+    text = json.dumps(kept, allow_nan=False, default=str)
+    flat: dict[str, Any] = json.loads(text, object_pairs_hook=_flat, parse_float=_shortest)
     return flat
 
 
-def _canonical(value: Any) -> Any:
-    """The value with 1.0 written as 1, at any depth: a number is the same however it was typed."""
-    if isinstance(value, dict):
-        return {key: _canonical(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_canonical(entry) for entry in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
+def _flat(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in pairs:
+        flat |= {f"{key}.{inner}": v for inner, v in value.items()} if isinstance(value, dict) else {key: value}
+    return flat
 
 
-@dataclass(frozen=True)
+def _shortest(text: str) -> int | float:
+    number = float(text)
+    return int(number) if number.is_integer() else number
+
+
+@dataclass(unsafe_hash=True)
 class RunDirectory:
-    """Where one run keeps its files; see the README for what each of them holds."""
+    """Where one run keeps its files; docs/run-directory.md says what each of them holds.
+
+    Attributes:
+        path: of the directory, ``<output>/<name>/<variant>-s<seed>-<hash>``.
+        manifest: status, versions, seeds, hash, budget spent, result.
+        config: the full configuration.
+        history: one row per generation.
+        champion: the champion team; a baseline has none.
+        hall_of_fame: the teams that the champion was chosen from.
+        robustness: one row per perturbation and level.
+        trace: the champion's path in the first test episode.
+        tiles: the grid world of the trace: path and cues of every tile at its end.
+        plots: directory of the figures.
+    """
 
     path: Path
 
-    @property
-    def manifest(self) -> Path:
-        """Status, versions, seeds, hash, budget spent, result."""
-        return self.path / "manifest.json"
-
-    @property
-    def config(self) -> Path:
-        """The full configuration."""
-        return self.path / "config.yaml"
-
-    @property
-    def history(self) -> Path:
-        """One row per generation."""
-        return self.path / "history.csv"
-
-    @property
-    def champion(self) -> Path:
-        """The champion team."""
-        return self.path / "champion.json"
-
-    @property
-    def hall_of_fame(self) -> Path:
-        """The teams that the champion was chosen from."""
-        return self.path / "hall_of_fame.jsonl"
-
-    @property
-    def robustness(self) -> Path:
-        """One row per perturbation and level."""
-        return self.path / "robustness.csv"
-
-    @property
-    def trace(self) -> Path:
-        """The champion's path in the first test episode."""
-        return self.path / "trace.csv"
-
-    @property
-    def tiles(self) -> Path:
-        """The grid world of the trace: path and cues of every tile at its end."""
-        return self.path / "tiles.csv"
-
-    @property
-    def plots(self) -> Path:
-        """Directory of the figures."""
-        return self.path / "plots"
+    def __post_init__(self) -> None:
+        self.manifest = self.path / "manifest.json"
+        self.config = self.path / "config.yaml"
+        self.history = self.path / "history.csv"
+        self.champion = self.path / "champion.json"
+        self.hall_of_fame = self.path / "hall_of_fame.jsonl"
+        self.robustness = self.path / "robustness.csv"
+        self.trace = self.path / "trace.csv"
+        self.tiles = self.path / "tiles.csv"
+        self.plots = self.path / "plots"
 
     @contextlib.contextmanager
     def claimed(
         self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool
-    ) -> Iterator[Claim]:
+    ) -> Iterator[bool]:
         """Hold the directory, made if need be, against other processes.
 
         Args:
@@ -130,81 +100,58 @@ class RunDirectory:
             lengthen: whether to make a finished one longer.
 
         Yields:
-            What is to be done there.
+            Whether the run is finished already.
 
         Raises:
             ExneatError: the directory cannot be made or used, or holds something else than this run.
         """
-        self._make()
+        make_directory(self.path)
         with self.held():
-            claim = self._claim(full_hash, configuration, resume=resume, lengthen=lengthen)
+            is_finished = self._may_be_used(full_hash, configuration, resume=resume, lengthen=lengthen)
             for directory in (self.path, self.plots):
-                delete_orphans(directory)
-            yield claim
-
-    def _make(self) -> None:
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:
-            raise ExneatError(f"{self.path}: expected a directory, got a file; set name= or output=") from None
-        except OSError as error:
-            raise ExneatError(
-                f"{self.path}: the run directory cannot be made: {error.strerror}\n"
-                "  set output= to a directory that you can write to"
-            ) from error
+                for orphan in directory.glob(".*.[0-9]*.tmp"):  # of a process that was killed while it wrote here
+                    delete(orphan)
+            yield is_finished
 
     def held(self) -> contextlib.AbstractContextManager[None]:
-        """Hold the directory against other processes.
-
-        Raises:
-            ExneatError: when entered, if another process holds it, or it cannot be opened.
-        """
+        """Hold the directory against other processes, see `locks.held`."""
         return held(self.path)
 
-    def _claim(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> Claim:
+    def _may_be_used(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> bool:
         if not self.manifest.exists():
-            if self._holds_nothing():
-                return Claim.BEGIN
-            raise ExneatError(
-                f"{self.path}: expected a new directory or a run, got one without manifest.json\n"
-                "  remove it, or set name= or output= to another place"
-            )
-        manifest = self.read_manifest()
-        fix = "  remove it, or set name= or output= to another place"
-        if manifest.get("format") != MANIFEST_FORMAT:
-            came = f"holds a run of format {manifest.get('format')!r}, expected {MANIFEST_FORMAT}"
-            raise ExneatError(f"{self.path}: {came}\n{fix}")
-        if manifest.get("configuration_hash") != full_hash:
-            raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{fix}")
-        status, there, asked = manifest.get("status"), manifest.get("generations"), configuration["generations"]
-        if status == DONE and there == asked:
-            return Claim.FINISHED
-        if not isinstance(there, int) or asked < there:
+            # A run that was killed before its manifest was written leaves temporary files alone.
+            if all(path.suffix == ".tmp" for path in self.path.iterdir()):
+                return False
+            came = "expected a new directory or a run, got one without manifest.json"
+            raise ExneatError(f"{self.path}: {came}\n{_ELSEWHERE}")
+        manifest, asked = self.read_manifest(), configuration["generations"]
+        if manifest.configuration_hash != full_hash:
+            raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{_ELSEWHERE}")
+        if self.is_finished(full_hash, asked):
+            return True
+        there, is_done = manifest.generations, manifest.status == DONE
+        if asked < there:
             raise ExneatError(
                 f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
                 "  generations= can only be raised; set name= to another folder for a shorter run"
             )
-        if not (lengthen if status == DONE else resume):
-            holds = f"a finished run of {there} generations" if status == DONE else f"an unfinished run ({status})"
+        if not (lengthen if is_done else resume):
+            holds = f"a finished run of {there} generations" if is_done else f"an unfinished run ({manifest.status})"
             raise ExneatError(f"{self.path}: holds {holds}\n  add resume=true to go on from where it stopped")
-        return Claim.CONTINUE
+        return False
 
     def _difference(self, configuration: Mapping[str, Any]) -> str:
         """What the run that is there has otherwise, in words."""
         try:
-            there = _flat(_that_matter(read_yaml(self.config), _NOT_HASHED))
-        except ExneatError:
+            there = _identity(read_yaml(self.config))
+        except (ExneatError, TypeError, ValueError):
             return "its config.yaml cannot be read"
-        asked = _flat(_that_matter(configuration, _NOT_HASHED))
-        keys = [key for key in sorted({*there, *asked}) if there.get(key) != asked.get(key)]
-        named = [f"{key} is {there.get(key, 'unset')} there, {asked.get(key, 'unset')} here" for key in keys[:3]]
-        return "; ".join(named) + ("; ..." if len(keys) > 3 else "") if keys else "its manifest is of another one"
+        here = _identity(configuration)
+        keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
+        named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
+        return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
 
-    def _holds_nothing(self) -> bool:
-        """Whether the directory is new, or left by a run that was killed before its manifest was written."""
-        return all(path.suffix == ".tmp" for path in self.path.iterdir())
-
-    def begin(self, config: str, manifest: dict[str, object]) -> None:
+    def begin(self, config: str, manifest: Manifest) -> None:
         """Write the first two files, the manifest first; if that fails, a directory that was new is gone again.
 
         Raises:
@@ -230,40 +177,45 @@ class RunDirectory:
             return self.manifest.exists()
         return False
 
-    def read_manifest(self) -> dict[str, Any]:
-        """The manifest as plain data.
+    def is_finished(self, full_hash: str | None = None, generations: int | None = None) -> bool:
+        """Whether a run is there and done, with this hash and length if they are given.
 
         Raises:
-            ExneatError: it is missing or damaged.
+            ExneatError: its manifest is damaged, or of another format.
         """
-        return read_manifest_data(self.manifest)
+        if not self.is_there():
+            return False
+        manifest = self.read_manifest()
+        same = full_hash in (None, manifest.configuration_hash) and generations in (None, manifest.generations)
+        return manifest.status == DONE and same
 
-    def read_result(self) -> dict[str, Any]:
-        """The result in the manifest of a finished run.
+    def read_manifest(self) -> Manifest:
+        """The manifest.
 
         Raises:
-            ExneatError: it is missing or damaged.
+            ExneatError: it is missing, damaged or of another format, or a finished run has no result.
         """
-        return result_of(self.manifest, self.read_manifest())
+        manifest, _ = read_json(self.manifest, Manifest, MANIFEST_FORMAT)
+        if manifest.status == DONE and manifest.result is None:
+            raise ExneatError(f"{self.manifest}: damaged: result: expected the figures of a finished run, got nothing")
+        return manifest
+
+    def read_result(self) -> Result:
+        """The result of a finished run; see `read_manifest`."""
+        result = self.read_manifest().result
+        if result is None:
+            raise ExneatError(f"{self.path}: expected a finished run, got one without a result")
+        return result
 
     def update_manifest(self, **changes: object) -> None:
-        """Replace or add entries of the manifest.
+        """Replace fields of the manifest.
 
         Raises:
             ExneatError: it cannot be read or written.
         """
-        write_json(self.manifest, {**self.read_manifest(), **changes})
+        write_json(self.manifest, msgspec.structs.replace(self.read_manifest(), **changes))
 
 
-def find_runs(output: Path) -> Iterator[RunDirectory]:
-    """Every run below an output root, in alphabetical order.
-
-    Raises:
-        ExneatError: the root cannot be read.
-    """
-    try:
-        manifests = sorted(output.glob("*/*/manifest.json"))
-    except OSError as error:
-        raise ExneatError(f"output={output}: cannot be read: {error.strerror}") from error
-    for manifest in manifests:
-        yield RunDirectory(manifest.parent)
+def find_runs(output: Path) -> list[RunDirectory]:
+    """Every run below an output root, in alphabetical order."""
+    return [RunDirectory((output / manifest).parent) for manifest in sorted(glob("*/*/manifest.json", root_dir=output))]

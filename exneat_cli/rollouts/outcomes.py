@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.tasks import FAILED, HasFullReward, Task
-from exneat_cli.wiring import Moments
+from exneat_cli.wiring import Moments, merged
 
 
 class Outcomes(NamedTuple):
@@ -16,10 +16,11 @@ class Outcomes(NamedTuple):
 
     Attributes:
         fitness: (B, E) the task's fitness; its failure floor where an episode failed.
-        full_reward: (B, E) the task's second figure; the failure floor likewise.
+        full_reward: (B, E) the task's second figure, else the fitness; the failure floor likewise.
         steps: (B, E) control steps done.
         failed: (B, E) whether physics or network exploded.
-        moments: (B, sensed) of what each brain sensed in its episodes, if it was asked for.
+        moments: (B, sensed) of what each brain sensed at all steps of its episodes, but for those that failed; None
+            unless they were asked for.
     """
 
     fitness: NDArray[np.float64]
@@ -42,34 +43,50 @@ class Trace(NamedTuple):
     tiles: NDArray[np.float64] | None
 
 
-class Results(NamedTuple):
+class Tally(NamedTuple):
     """What the loop writes for B brains in E episodes.
 
     Attributes:
         status: (E, B) how episodes ended: ``ENDED`` or ``FAILED``.
         steps: (E, B) control steps done.
         totals: (E, B, terms) sums of the reward terms.
+        means, squares: (E, B, sensed) of what was sensed: means, and sums of squared deviations from them;
+            (E, B, 0) where nobody asked.
     """
 
     status: NDArray[np.int64]
     steps: NDArray[np.int64]
     totals: NDArray[np.float64]
+    means: NDArray[np.float64]
+    squares: NDArray[np.float64]
 
     @classmethod
-    def empty(cls, brains: int, episodes: int, terms: int) -> Results:
-        """Room for results, all 0."""
-        shape = (episodes, brains)
-        return cls(np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros((*shape, terms)))
-
-    def of_episode(self, episode: int) -> Results:
-        """Views of one episode, without the first axis."""
-        return Results(*(values[episode] for values in self))
+    def empty(cls, task: Task, brains: int, episodes: int, *, moments: bool) -> Tally:
+        """Room for all of it, 0 everywhere."""
+        shape, sensed = (episodes, brains), task.sensed_size if moments else 0
+        status, steps = np.zeros((2, *shape), np.int64)
+        means, squares = np.zeros((2, *shape, sensed))
+        return cls(status, steps, np.zeros((*shape, len(task.terms))), means, squares)
 
     def outcomes(self, task: Task) -> Outcomes:
-        """What they mean in a task."""
+        """What it means in a task."""
         with np.errstate(invalid="ignore"):
             fitness = task.fitness_of(self.totals).T
             full_reward = task.full_reward_of(self.totals).T if isinstance(task, HasFullReward) else fitness
         failed = (self.status.T == FAILED) | ~np.isfinite(fitness) | ~np.isfinite(full_reward)
-        floor = task.failure_floor
-        return Outcomes(np.where(failed, floor, fitness), np.where(failed, floor, full_reward), self.steps.T, failed)
+        return Outcomes(
+            fitness=np.where(failed, task.failure_floor, fitness),
+            full_reward=np.where(failed, task.failure_floor, full_reward),
+            steps=self.steps.T,
+            failed=failed,
+            moments=self._moments(~failed.T) if self.means.shape[-1] else None,
+        )
+
+    def _moments(self, sound: NDArray[np.bool_]) -> Moments:
+        """(B, sensed) over the `sound`, (E, B), episodes, merged in their order."""
+        # What is not finite would stay so in the statistics of a whole training.
+        sound = (sound & np.isfinite(self.squares).all(axis=-1))[..., np.newaxis]
+        each = (np.where(sound, values, 0.0) for values in (self.steps[..., np.newaxis], self.means, self.squares))
+        counts, means, squares = (np.broadcast_to(v, self.means.shape).reshape(len(sound), -1) for v in each)
+        together = merged(map(Moments, counts, means, squares), means.shape[1])
+        return Moments(*(values.reshape(self.means.shape[1:]) for values in together))

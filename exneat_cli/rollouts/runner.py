@@ -6,21 +6,24 @@ the number of workers nor on which of them ran what.
 
 from __future__ import annotations
 
+import contextlib
+from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from exneat_cli.brains import Brain, Brains, RandomActions, motionless
+from exneat_cli.brains import Brains, RandomActions, motionless
 from exneat_cli.brains.brain import lay_out
-from exneat_cli.rollouts.cluster_work import ClusterWork
-from exneat_cli.rollouts.episode import Conditions
-from exneat_cli.rollouts.executor import Executor
-from exneat_cli.rollouts.noise import Noise
-from exneat_cli.rollouts.outcomes import Outcomes, Results, Trace
-from exneat_cli.rollouts.player import Crew, Player, Setup
-from exneat_cli.rollouts.threads import Threads
+from exneat_cli.rollouts.cluster import cluster_of, keep_clusters
+from exneat_cli.rollouts.episode import Acting, World
+from exneat_cli.rollouts.outcomes import Outcomes, Tally, Trace
+from exneat_cli.rollouts.settings import Executor, Noise
+from exneat_cli.rollouts.sharing import shares_for_threads, short_shares
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
+
+Actors = Brains | Sequence[Brains] | RandomActions
 
 
 class Runner:
@@ -37,65 +40,81 @@ class Runner:
     """
 
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
-        self._task = task
-        self._noise = noise
-        setup = Setup(task, noise, training)
-        halt = np.zeros(1, dtype=np.bool_)
-        self._player = Player(setup, halt)
-        self.compiled = self._player.compiled
-        self._work: Threads | ClusterWork
-        if executor.name == "dask":
-            self._work = ClusterWork(setup, executor)
-        else:
-            self._work = Threads([self._player, *(Player(setup, halt) for _ in range(executor.threads - 1))], halt)
+        self._task, self._noise, self._executor, self._training = task, noise, executor, training
+        self._halt = np.zeros(1, dtype=np.bool_)
+        threads = executor.threads if executor.name == "threads" else 1
+        self._worlds = [World(task, noise, training=training, halt=self._halt) for _ in range(threads)]
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="episodes")  # starts none before it has work
+        with contextlib.ExitStack() as ending:
+            ending.callback(self._pool.shutdown, cancel_futures=True)
+            ending.callback(self._halt.fill, True)  # threads end before the next step of their episodes
+            if executor.name == "dask":
+                ending.enter_context(keep_clusters())
+                cluster_of(executor)
+            self._ending = ending.pop_all()
 
     def __enter__(self) -> Runner:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._work.close()
+        self._ending.close()
 
-    def run(
-        self,
-        brains: Brains | Sequence[Brain] | RandomActions,
-        episodes: Sequence[EpisodeSeeds],
-        *,
-        moments: bool = False,
-    ) -> Outcomes:
+    def run(self, brains: Actors, episodes: Sequence[EpisodeSeeds], *, moments: bool = False) -> Outcomes:
         """Outcomes of every brain (one, if it acts at random) in every episode.
 
+        Args:
+            brains: who acts.
+            episodes: the same for all of them.
+            moments: whether statistics of what each brain senses are wanted, see `Outcomes`.
+
         Raises:
-            ValueError: there is no brain, or one was wired for other sizes of observation or action.
+            ValueError: there is no brain, or one was wired for other sizes of what is sensed or of the action.
             ExneatError: the executor's cluster has no workers left, or cannot be used.
         """
-        crew = self._crew(brains)
-        results = Results.empty(len(crew.brains.size), len(episodes), len(self._task.terms))
-        self._work.play(crew, episodes, results)
-        return results.outcomes(self._task)
+        acting = self._acting(brains)
+        count = len(acting[0].size)
+        tally = Tally.empty(self._task, count, len(episodes), moments=moments)
+        if self._executor.name == "serial":
+            self._worlds[0].run(short_shares(count, len(episodes)), acting, episodes, tally)
+        elif self._executor.name == "threads":
+            self._run_on_threads(acting, episodes, tally)
+        else:
+            cluster_of(self._executor).run((self._task, self._noise, self._training), acting, episodes, tally)
+        return tally.outcomes(self._task)
 
-    def trace(self, brain: Brain | RandomActions, seeds: EpisodeSeeds) -> Trace:
+    def trace(self, brain: Brains | RandomActions, seeds: EpisodeSeeds) -> Trace:
         """The path of one episode, and the world that it went through; always runs in this process."""
-        crew = self._crew([brain] if isinstance(brain, Brain) else brain)
-        buffers = self._player.buffers(crew)
-        results = Results.empty(1, 1, len(self._task.terms))
-        columns = len(self._task.trace_columns) + len(self._task.terms)
-        self._player.play(crew, buffers, (0, 1), seeds, results.of_episode(0))
-        steps = np.zeros((int(results.steps[0, 0]) + 1, columns))
-        self._player.play(crew, buffers, (0, 1), seeds, results.of_episode(0), steps)
-        return Trace(steps, self._player.tiles())
+        acting = self._acting(brain)
+        tally = Tally.empty(self._task, 1, 1, moments=False)
+        path = np.zeros((self._task.longest_episode + 1, len(self._task.trace_columns) + len(self._task.terms)))
+        self._worlds[0].run([(0, 0, 1)], acting, [seeds], tally, path)
+        return Trace(path[: tally.steps[0, 0] + 1].copy(), self._worlds[0].tiles())
 
-    def _crew(self, brains: Brains | Sequence[Brain] | RandomActions) -> Crew:
+    def _run_on_threads(self, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
+        """A thread per world: the compiled loop holds no GIL, so they run side by side."""
+        # Threads may share the iterator of a list, which takes a step without letting go of the GIL; no generator.
+        shares = iter(list(shares_for_threads(len(acting[0].size), len(episodes), len(self._worlds))))
+
+        def work(world: World) -> None:
+            try:
+                world.run(shares, acting, episodes, tally)
+            except BaseException:
+                deque(shares, maxlen=0)  # nothing is left for the other threads
+                raise
+
+        for worker in wait([self._pool.submit(work, world) for world in self._worlds]).done:
+            worker.result()
+
+    def _acting(self, brains: Actors) -> Acting:
         """Brains end to end; refuses those that compiled code would let read and write elsewhere."""
         task = self._task
         actions = len(task.actuator_names)
         low, high = np.zeros(actions), np.full(actions, task.tie_noise)
         if isinstance(brains, RandomActions):
             low, high = brains
-            brains = [motionless(task.observation_size, np.zeros(len(low)))]
+            brains = [motionless(task.sensed_size, np.zeros(len(low)))]
         brains = brains if isinstance(brains, Brains) else lay_out(brains)
-        expected, came = (task.observation_size, actions), (brains.observation_size, brains.output_slot.shape[1])
+        expected, came = (task.sensed_size, actions), (brains.observation_size, brains.output_slot.shape[1])
         if came != expected:
             raise ValueError(f"brains: expected sizes {expected} of observation and action, got {came}")
-        lowest, highest = task.observation_limits
-        conditions = Conditions(float(self._noise.sensor_std), float(lowest), float(highest), low, high - low)
-        return Crew(brains, conditions)
+        return brains, low, high - low

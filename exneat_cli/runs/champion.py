@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
-
 import numpy as np
 
 from exneat_cli.algorithms import Team
-from exneat_cli.brains import Brain, acting_by_rule, assemble, motionless
+from exneat_cli.brains import Brains, acting_by_rule, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import (
     UNPERTURBED,
     Champion,
+    Genome,
+    Result,
     RunDirectory,
+    Scores,
     merge_robustness,
-    write_champion,
     write_csv,
     write_hall_of_fame,
+    write_json,
 )
 from exneat_cli.rollouts import Runner, Trace
 from exneat_cli.runs.progress import Progress
@@ -27,7 +27,7 @@ from exneat_cli.runs.training import Training
 from exneat_cli.seeding import shared_episodes
 
 
-def choose_champion(training: Training, directory: RunDirectory, progress: Progress) -> dict[str, Any]:
+def choose_champion(training: Training, directory: RunDirectory, progress: Progress) -> Result:
     """Validate the candidates, test the best, write both; returns the figures for the manifest.
 
     Source of the rule: Zhang (2025), section 3.3.
@@ -49,49 +49,53 @@ def choose_champion(training: Training, directory: RunDirectory, progress: Progr
         tested = score_brains(runner, [brains[best], _standing_still(settings), first], "test", settings.test_episodes)
         trace = runner.trace(brains[best], shared_episodes("test", 1)[0])
     champion = candidates[best]
-    scores = {
-        "training": {"fitness": champion.fitness, "generation": champion.generation + 1},
-        "validation": asdict(validation[best]),
-        "test": asdict(tested[0]),
-    }
+    scores = Scores(
+        training={"fitness": champion.fitness, "generation": champion.generation + 1},
+        validation=validation[best],
+        test=tested[0],
+    )
     write_hall_of_fame(directory.hall_of_fame, candidates, [each.fitness_mean for each in validation])
-    write_champion(directory.champion, _champion(settings, champion.team, scores))
+    write_json(directory.champion, _champion(settings, champion.team, scores))
     _write_trace(settings, directory, trace)
-    names = ("champion", "standing_still", "first_generation")
-    figures = {"training": last["best_so_far"], "validation": validation[best].fitness_mean}
-    return {**figures, **{name: asdict(each) for name, each in zip(names, tested, strict=True)}}
+    return Result(
+        training=last["best_so_far"],
+        validation=validation[best].fitness_mean,
+        champion=tested[0],
+        standing_still=tested[1],
+        first_generation=tested[2],
+    )
 
 
-def measure_baseline(settings: RunSettings, directory: RunDirectory) -> dict[str, Any]:
+def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
     """Test an agent that follows a rule; returns the figures for the manifest."""
     assert settings.algorithm.rule is not None
     acting = acting_by_rule(settings.algorithm.rule, settings.task)
     episodes = unseen_episodes(settings, settings.test_episodes)
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_all(runner.run([acting] if isinstance(acting, Brain) else acting, episodes))
+        (tested,) = score_all(runner.run(acting, episodes))
         (standing,) = score_brains(runner, [_standing_still(settings)], "test", settings.test_episodes)
         trace = runner.trace(acting, episodes[0])
     _write_trace(settings, directory, trace)
     merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
-    return {"champion": asdict(tested), "standing_still": asdict(standing)}
+    return Result(champion=tested, standing_still=standing)
 
 
-def _compile(settings: RunSettings, team: Team) -> Brain:
+def _compile(settings: RunSettings, team: Team) -> Brains:
     return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
 
 
-def _standing_still(settings: RunSettings) -> Brain:
+def _standing_still(settings: RunSettings) -> Brains:
     return motionless(settings.task.sensed_size, settings.task.resting_action)
 
 
-def _champion(settings: RunSettings, team: Team, scores: dict[str, Any]) -> Champion:
+def _champion(settings: RunSettings, team: Team, scores: Scores) -> Champion:
     return Champion(
         variant=settings.variant,
         task=settings.to_plain()["task"],
         actuators=settings.task.actuator_names,
         feed_forward=settings.evolution.feed_forward,
         plan=settings.plan,
-        genomes=team.genomes,
+        genomes=tuple(map(Genome.of, team.genomes)),
         scores=scores,
     )
 

@@ -9,36 +9,25 @@ from exneat_cli.records import HistoryRow
 
 
 class Progress:
-    """What a training tells; this one says nothing, which is the default from Python."""
+    """What a training tells: about ten plain lines per run.
 
-    def start(self, title: str, generations: int) -> None:
-        """Training begins."""
+    Args:
+        stream: where the lines go; without it nothing is said, which is the default from Python.
+    """
 
-    def say(self, text: str) -> None:
-        """Something worth one line."""
-
-    def generation(self, row: HistoryRow) -> None:
-        """A generation is done."""
-
-    def stop(self) -> None:
-        """Training is over, whether it went well or not."""
-
-
-class Lines(Progress):
-    """About ten plain lines per run, for logs."""
-
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
         self._title = ""
         self._generations = 1
 
     def start(self, title: str, generations: int) -> None:
-        """Remember the title for every line."""
+        """Begin a training; the title stands before every line."""
         self._title, self._generations = title, generations
 
     def say(self, text: str) -> None:
-        """Print the line."""
-        print(f"{self._title}: {text}" if self._title else text, file=self._stream, flush=True)
+        """Print something that is worth a line."""
+        if self._stream is not None:
+            print(f"{self._title}: {text}" if self._title else text, file=self._stream, flush=True)
 
     def generation(self, row: HistoryRow) -> None:
         """Print every tenth part of the run, and the last generation."""
@@ -46,6 +35,9 @@ class Lines(Progress):
         if number % max(1, self._generations // 10) == 0 or number == self._generations:
             each = row["wall_seconds"] / number
             self.say(f"generation {number}/{self._generations}  {_figures(row)}  {each:.2f} s each")
+
+    def stop(self) -> None:
+        """End the training, whether it went well or not."""
 
 
 class Bar(Progress):
@@ -87,7 +79,7 @@ class Bar(Progress):
 
 def progress_for_terminal() -> Progress:
     """A bar if standard error is a terminal, else lines on it."""
-    return Bar() if sys.stderr.isatty() else Lines(sys.stderr)
+    return Bar() if sys.stderr.isatty() else Progress(sys.stderr)
 
 
 def _figures(row: HistoryRow) -> str:

@@ -8,21 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from exneat_cli.brains import Brain, RandomActions, acting_by_rule
+from exneat_cli.brains import Brains, RandomActions, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
-from exneat_cli.interruption import finishing
-from exneat_cli.records import (
-    DONE,
-    MANIFEST_FORMAT,
-    RunDirectory,
-    merge_robustness,
-    read_champion,
-    read_robustness,
-    read_yaml,
-)
-from exneat_cli.rollouts import Executor, Sweep, keep_clusters, perturbed, run_levels
+from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
 from exneat_cli.runs.progress import Progress
-from exneat_cli.runs.scores import Score, robustness_row, score_all, unseen_episodes
+from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 
 
@@ -36,17 +27,14 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     if not directory.is_there():
         raise ExneatError(f"{where}: no run is there; exneat inspect without run= lists them")
     manifest = directory.read_manifest()
-    if manifest.get("format") != MANIFEST_FORMAT:
-        raise ExneatError(f"{where}: expected a run of format {MANIFEST_FORMAT}, got {manifest.get('format')!r}")
-    if manifest.get("status") != DONE:
+    if manifest.status != DONE:
         fix = "finish it first: the command that began it, with resume=true"
-        raise ExneatError(f"{where}: expected a finished run, got status {manifest.get('status')!r}\n  {fix}")
+        raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
         settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
-    described = {"configuration_hash": settings.full_hash, "generations": settings.trained_generations}
-    if any(manifest.get(key) != value for key, value in described.items()):
+    if not directory.is_finished(settings.full_hash, settings.trained_generations):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
 
@@ -54,16 +42,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
 def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> bool:
     """Whether the run of these settings is done and was tested at every level of `sweeps`."""
     directory = settings.directory
-    if not directory.is_there():
-        return False
-    manifest = directory.read_manifest()
-    wanted = {
-        "format": MANIFEST_FORMAT,
-        "status": DONE,
-        "configuration_hash": settings.full_hash,
-        "generations": settings.trained_generations,
-    }
-    if any(manifest.get(key) != value for key, value in wanted.items()):
+    if not directory.is_finished(settings.full_hash, settings.trained_generations):
         return False
     return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
 
@@ -125,10 +104,12 @@ def run_robustness(
             if not levels:
                 continue
             (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
-            todo = Sweep(sweep.name, sweep.parameter, levels)
-            seeds = unseen_episodes(settings, episodes)
-            tested = run_levels(acting, settings.task, settings.noise, todo, executor, seeds)
-            _write(directory, settings, sweep, {level: score_all(outcomes)[0] for level, outcomes in tested})
+            seeds, scores = unseen_episodes(settings, episodes), {}
+            for level in levels:
+                changed = perturbed(settings.task, settings.noise, sweep, level)
+                with Runner(*changed, executor, training=False) as runner:
+                    (scores[level],) = score_all(runner.run(acting, seeds))
+            _write(directory, settings, sweep, scores)
             done += len(levels)
     return done
 
@@ -137,18 +118,17 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
     rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
     failed = [each.failed_episodes for each in scores.values()]
     named = [f"{sweep.name}={row.level!r}, {row.episodes} episodes" for row in rows]
-    with finishing():
-        # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
-        _count_failures(directory, dict(zip(named, failed, strict=True)))
-        merge_robustness(directory.robustness, rows)
+    # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+    _count_failures(directory, dict(zip(named, failed, strict=True)))
+    merge_robustness(directory.robustness, rows)
 
 
 def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
-    counted = {**directory.read_manifest().get("failed_robustness_episodes", {}), **failed}
+    counted = {**directory.read_manifest().failed_robustness_episodes, **failed}
     directory.update_manifest(failed_robustness_episodes={key: count for key, count in counted.items() if count})
 
 
-def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] | RandomActions:
+def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | RandomActions:
     rule = settings.algorithm.rule
     if rule is None:
         champion = read_champion(directory.champion)
@@ -158,6 +138,5 @@ def _acting(directory: RunDirectory, settings: RunSettings) -> Sequence[Brain] |
             )
         if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
             raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
-        return [champion.brain()]
-    acting = acting_by_rule(rule, settings.task)
-    return acting if isinstance(acting, RandomActions) else [acting]
+        return champion.brain()
+    return acting_by_rule(rule, settings.task)

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
 
+import msgspec
 import yaml
 
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import signal_heard
 from exneat_cli.records import (
     DONE,
     FAILED,
     INTERRUPTED,
     MANIFEST_FORMAT,
     RUNNING,
-    Claim,
+    Manifest,
+    Result,
     RunDirectory,
     provenance,
     read_checkpoints,
@@ -46,18 +48,14 @@ class Finished:
     """
 
     directory: RunDirectory
-    result: dict[str, Any]
+    result: Result
     summary: str
     trained_now: bool
 
 
 @keep_clusters()
 def train(
-    settings: RunSettings,
-    *,
-    progress: Progress | None = None,
-    command: Sequence[str] = (),
-    go_on: bool = False,
+    settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
     """Do one run, or find it done.
 
@@ -75,11 +73,11 @@ def train(
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
     resume, lengthen = settings.resume or go_on, settings.resume
-    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as claim:
-        if claim is not Claim.FINISHED:
-            with _recorded(directory, settings, progress, command) as result:
+    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as was_done:
+        if not was_done:
+            with _recorded(directory, settings, progress, command):
                 if settings.algorithm.rule:
-                    result |= measure_baseline(settings, directory)
+                    result = measure_baseline(settings, directory)
                 else:
                     training = Training.resumed(
                         settings, read_checkpoints(directory.path, settings.full_hash), progress.say
@@ -89,14 +87,16 @@ def train(
                             training.advance(runner)
                             _save(directory, training)
                             progress.generation(training.history[-1])
-                    result |= choose_champion(training, directory, progress)
+                    result = choose_champion(training, directory, progress)
+                directory.update_manifest(status=DONE, finished=_now(), result=result)
         result = directory.read_result()
-    trained_now = claim is not Claim.FINISHED
-    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=trained_now)
+    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=not was_done)
 
 
 def _save(directory: RunDirectory, training: Training) -> None:
     """Write down the generation that is done."""
+    if signal_heard() is not None:  # Python drops an exception that comes up in a callback of a weak reference
+        raise KeyboardInterrupt
     write_history(directory.history, training.history)
     if training.is_over or len(training.history) % training.settings.checkpoint_every == 0:
         write_checkpoint(directory.path, training.checkpoint(), training.settings.full_hash)
@@ -105,59 +105,62 @@ def _save(directory: RunDirectory, training: Training) -> None:
 @contextlib.contextmanager
 def _recorded(
     directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]
-) -> Iterator[dict[str, Any]]:
-    """Keep the manifest: how the run began and how it ended; yields what becomes its result."""
-    before = directory.read_manifest() if directory.is_there() else {}
+) -> Iterator[None]:
+    """Keep the manifest: how the run began, and how it ended if that is before its result."""
+    before = directory.read_manifest() if directory.is_there() else None
     manifest = _first_manifest(settings, command)
     if before:
         _tell_other_versions(before, progress)
-        manifest |= {"started": before.get("started"), "resumed": [*before.get("resumed", []), _now()]}
+        manifest = msgspec.structs.replace(manifest, started=before.started, resumed=(*before.resumed, _now()))
         directory.forget_what_was_derived()
-    result: dict[str, Any] = {}
     try:
         directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
         progress.start(directory.path.name, settings.generations)
-        yield result
-        directory.update_manifest(status=DONE, finished=_now(), result=result)
-    except BaseException as error:
-        with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-            if not directory.is_there() or directory.read_manifest().get("status") != RUNNING:
-                pass
-            elif isinstance(error, KeyboardInterrupt):
-                directory.update_manifest(status=INTERRUPTED)
-            else:
-                directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+        yield
+    except (Exception, KeyboardInterrupt) as error:
+        _mark_unfinished(directory, error)
         raise
     finally:
         progress.stop()
 
 
-def _tell_other_versions(before: Mapping[str, Any], progress: Progress) -> None:
-    now, then = provenance.versions(), dict(before.get("versions") or {})
+def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
+    interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
+        if not directory.is_there() or directory.read_manifest().status != RUNNING:
+            return
+        if interrupted:
+            directory.update_manifest(status=INTERRUPTED)
+        else:
+            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+
+
+def _tell_other_versions(before: Manifest, progress: Progress) -> None:
+    now, then = provenance.versions(), before.versions
     changed = [name for name in now if then.get(name) != now[name]]
     if changed:
         names = ", ".join(f"{name} {then.get(name)} then, {now[name]} now" for name in changed)
         progress.say(f"{names}: results may differ from those of an undisturbed run")
 
 
-def _first_manifest(settings: RunSettings, command: Sequence[str]) -> dict[str, object]:
-    return {
-        "format": MANIFEST_FORMAT,
-        "status": RUNNING,
-        "process": os.getpid(),
-        "variant": settings.variant,
-        "task": settings.task.name,
-        "seed": settings.seed,
-        "configuration_hash": settings.full_hash,
-        "generations": settings.trained_generations,
-        "command": list(command),
-        "started": _now(),
-        "seeds": {"root": settings.seed, "streams": STREAMS},
-        "versions": provenance.versions(),
-        "processor": provenance.processor(),
-        "cores": os.cpu_count(),
-        "git_commit": provenance.git_commit(),
-    }
+def _first_manifest(settings: RunSettings, command: Sequence[str]) -> Manifest:
+    return Manifest(
+        format=MANIFEST_FORMAT,
+        status=RUNNING,
+        process=os.getpid(),
+        variant=settings.variant,
+        task=settings.task.name,
+        seed=settings.seed,
+        configuration_hash=settings.full_hash,
+        generations=settings.trained_generations,
+        command=tuple(command),
+        started=_now(),
+        seeds={"root": settings.seed, "streams": STREAMS},
+        versions=provenance.versions(),
+        processor=provenance.processor(),
+        cores=os.cpu_count(),
+        git_commit=provenance.git_commit(),
+    )
 
 
 def _now() -> str:

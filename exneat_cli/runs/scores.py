@@ -3,39 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain
-from exneat_cli.records import RobustnessRow
+from exneat_cli.brains import Brains
+from exneat_cli.records import Result, RobustnessRow, Score
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import Task
-
-
-@dataclass(frozen=True)
-class Score:
-    """Means and standard deviations (population, over episodes) of one brain.
-
-    Attributes:
-        episodes: how many were run.
-        fitness_mean, fitness_std: of the task's fitness.
-        full_reward_mean, full_reward_std: of the task's second figure.
-        failed_episodes: how many failed; those count with the failure floor.
-        fitness: of each episode, in the order of the shared episodes.
-    """
-
-    episodes: int
-    fitness_mean: float
-    fitness_std: float
-    full_reward_mean: float
-    full_reward_std: float
-    failed_episodes: int
-    fitness: tuple[float, ...]
 
 
 def score_all(outcomes: Outcomes) -> list[Score]:
@@ -56,7 +33,7 @@ def _score(fitness: NDArray[np.float64], full_reward: NDArray[np.float64], faile
     )
 
 
-def score_brains(runner: Runner, brains: Sequence[Brain], purpose: str, episodes: int) -> list[Score]:
+def score_brains(runner: Runner, brains: Sequence[Brains], purpose: str, episodes: int) -> list[Score]:
     """Scores of several brains on the same ``"validation"`` or ``"test"`` episodes, side by side."""
     return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
 
@@ -76,37 +53,37 @@ def robustness_row(settings: RunSettings, parameter: str, level: float, score: S
     return RobustnessRow(settings.variant, settings.seed, parameter, float(level), score.episodes, *figures)
 
 
-def summary_sentence(task: Task, result: dict[str, Any]) -> str:
+def summary_sentence(task: Task, result: Result) -> str:
     """What a run learned, in one sentence, from the `result` entry of its manifest.
 
     It says "Learned" only if the champion beats both baselines clearly: on the same test episodes, the
     mean difference exceeds twice its standard error.
     """
-    champion, standing = result["champion"], result["standing_still"]
+    champion, standing = result.champion, result.standing_still
     digits = task.fitness_decimals
-    episodes = f"on {champion['episodes']} test episodes"
+    episodes = f"on {champion.episodes} test episodes"
     earned = (
-        f"earned a {task.fitness_name} of {champion['fitness_mean']:.{digits}f} on average "
-        f"(sd {champion['fitness_std']:.{digits}f}{_failures(champion)}), "
-        f"beside {standing['fitness_mean']:.{digits}f} for standing still"
+        f"earned a {task.fitness_name} of {champion.fitness_mean:.{digits}f} on average "
+        f"(sd {champion.fitness_std:.{digits}f}{_failures(champion)}), "
+        f"beside {standing.fitness_mean:.{digits}f} for standing still"
     )
-    if "first_generation" not in result:
+    first = result.first_generation
+    if first is None:
         return f"No training: {episodes} the baseline {earned}."
-    first = result["first_generation"]
     learned = _clearly_better(champion, standing) and _clearly_better(champion, first)
     return (
         f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
-        f"and {first['fitness_mean']:.{digits}f} for the best team of the random first generation."
+        f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation."
     )
 
 
-def _failures(figures: dict[str, Any]) -> str:
-    failed = figures["failed_episodes"]
-    return f", {failed} of {figures['episodes']} episodes failed" if failed else ""
+def _failures(score: Score) -> str:
+    failed = score.failed_episodes
+    return f", {failed} of {score.episodes} episodes failed" if failed else ""
 
 
-def _clearly_better(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    difference = np.array(one["fitness"]) - np.array(other["fitness"])
+def _clearly_better(one: Score, other: Score) -> bool:
+    difference = np.array(one.fitness) - np.array(other.fitness)
     if len(difference) < 2:
         return False
     return bool(difference.mean() > 2.0 * difference.std(ddof=1) / np.sqrt(len(difference)))

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_section, check_text, check_whole
@@ -15,6 +15,7 @@ from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
+_Part = TypeVar("_Part")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -68,7 +69,7 @@ class RunSettings:
         if self.evolution is None:
             object.__setattr__(self, "evolution", RECURRENT if self.task.recurrent else EvolutionSettings())
         if isinstance(self.algorithm, str):
-            object.__setattr__(self, "algorithm", _algorithm({"name": self.algorithm}))
+            object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -78,7 +79,7 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
-        check_text("output", self.output, "a directory")
+        check_text("output", self.output, "a directory, without control characters")
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
@@ -140,24 +141,13 @@ class RunSettings:
         Raises:
             ConfigError: a key is unknown, or a value has the wrong type or range.
         """
-        parts: dict[str, type[Any]] = {
-            "geometry": Geometry,
-            "wiring": Wiring,
-            "noise": Noise,
-            "evolution": EvolutionSettings,
-            "executor": Executor,
-        }
-        task = check_section("task", plain.get("task", {}))
-        check_choice("task.name", task.get("name"), list(TASKS))
-        values: dict[str, Any] = dict(plain)
-        values["task"] = build(TASKS[task["name"]], task, "task.")
-        values["algorithm"] = _algorithm(check_section("algorithm", plain.get("algorithm", {"name": "exneat"})))
-        for key, part in parts.items():
-            if key in values:
-                values[key] = build(part, values[key], f"{key}.")
-        return build(cls, values, "")
+        task = _chosen(TASKS, "task", plain.get("task"))
+        algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
+        return build(cls, {**plain, "task": task, "algorithm": algorithm})
 
 
-def _algorithm(values: Mapping[str, Any]) -> Algorithm:
-    check_choice("algorithm", values.get("name"), list(ALGORITHMS))
-    return build(ALGORITHMS[values["name"]], values, "algorithm.")
+def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:
+    """One of several dataclasses, by the ``name`` in its section."""
+    section = check_section(key, values)
+    check_choice(key, section.get("name"), list(registry))
+    return build(registry[section["name"]], section, f"{key}.")

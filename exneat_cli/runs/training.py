@@ -6,36 +6,20 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms import (
-    Problem,
-    Results,
-    Search,
-    State,
-    Team,
-    pack_teams,
-    unpack_teams,
-)
+from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
 from exneat_cli.brains import assemble_all
-from exneat_cli.records import Checkpoint, HistoryRow
+from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import training_episodes
 from exneat_cli.wiring import pooled_by_pin
 
 _FIRST = "first_generation"
-
-
-class _Turn(NamedTuple):
-    """Teams of one `ask`, what came out of their episodes, and what the algorithm was told."""
-
-    teams: Sequence[Team]
-    outcomes: Outcomes
-    results: Results
 
 
 @dataclass
@@ -107,29 +91,29 @@ class Training:
 
     def advance(self, runner: Runner) -> None:
         """Evaluate one generation, in as many turns as the algorithm wants, and record it."""
-        settings, turns, over = self.settings, list[_Turn](), False
+        settings, over = self.settings, False
+        teams: list[Team] = []
+        outcomes: list[Outcomes] = []
         while not over:
             trials = self.search.ask()
             genomes = [team.genomes for team in trials.teams]
             brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
-            done = sum(turn.outcomes.steps.shape[1] for turn in turns)
+            done = sum(each.steps.shape[1] for each in outcomes)
             episodes = training_episodes(settings.seed, len(self.history), trials.episodes, first=done)
-            outcomes = runner.run(brains, episodes, moments=settings.algorithm.wants_moments)
-            turns.append(_Turn(trials.teams, outcomes, _results(settings, outcomes)))
-            over = self.search.tell(turns[-1].results)
-        self._record(turns)
+            outcomes.append(runner.run(brains, episodes, moments=settings.algorithm.wants_moments))
+            teams += trials.teams
+            over = self.search.tell(_results(settings, outcomes[-1]))
+        self._record(teams, outcomes)
 
-    def _record(self, turns: Sequence[_Turn]) -> None:
+    def _record(self, teams: Sequence[Team], outcomes: Sequence[Outcomes]) -> None:
         before = self.history[-1] if self.history else None
-        teams = [team for turn in turns for team in turn.teams]
-        fitness = [value for turn in turns for value in turn.results.fitness.mean(axis=1).tolist()]
-        sound = np.flatnonzero(~np.concatenate([turn.results.failed for turn in turns])).tolist()
+        fitness = [value for each in outcomes for value in each.fitness.mean(axis=1).tolist()]
+        sound = np.flatnonzero(~np.concatenate([each.failed.any(axis=1) for each in outcomes])).tolist()
         best = max(sound or range(len(teams)), key=lambda k: fitness[k])
         if self.first_generation is None:
             self.first_generation = teams[best]
         shapes = self.settings.plan.subpopulation_shapes
         sizes = [genome.size() for genome in teams[best].genomes]
-        outcomes = [turn.outcomes for turn in turns]
         self.history.append(
             {
                 "generation": len(self.history) + 1,
@@ -170,7 +154,7 @@ def _problem(settings: RunSettings) -> Problem:
 def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
     """A row of a checkpoint, which must be that of generation `number`."""
     finite = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
-    if not finite or row["generation"] != number:
+    if not finite or row["generation"] != number or not row.keys() >= set(HISTORY_COLUMNS):
         raise ValueError(f"expected the figures of generation {number}, got {row}")
     return dict(row)
 

@@ -5,9 +5,10 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
-from exneat_cli.tasks.grid.environment import WORLDS
-from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
+from exneat_cli.tasks.grid.general_maze import GeneralMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
+from exneat_cli.tasks.grid.track_maze import TrackMaze
+from exneat_cli.tasks.grid.world import GridTask
 from exneat_cli.tasks.robots.ant import AntTask
 from exneat_cli.tasks.task import (
     ENDED,
@@ -30,23 +31,10 @@ TASKS: dict[str, type[Task]] = {
 }
 """Every task by the name it has in `conf/task`."""
 
-for _id in WORLDS:
-    gymnasium.register(id=_id, entry_point="exneat_cli.tasks.grid.environment:GridEnvironment", kwargs={"world": _id})
-
-__all__ = [
-    "ENDED",
-    "FAILED",
-    "RUNNING",
-    "TASKS",
-    "AntTask",
-    "Foraging",
-    "GeneralMaze",
-    "HasFullReward",
-    "HasInitialPose",
-    "HasTiles",
-    "Hunting",
-    "Part",
-    "Simulation",
-    "Task",
-    "TrackMaze",
-]
+for _name, _task in TASKS.items():
+    if issubclass(_task, GridTask):
+        gymnasium.register(
+            id=f"exneat/{_task.__name__}-v0",
+            entry_point="exneat_cli.tasks.grid.environment:GridEnvironment",
+            kwargs={"task": _name},
+        )

@@ -5,23 +5,3 @@ from exneat_cli.wiring.linkage import LINKAGES, Linkage, Sizes, counter_clockwis
 from exneat_cli.wiring.moments import Moments, merged, pooled_by_pin
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan
 from exneat_cli.wiring.planning import Wiring, plan_body, plan_modules, refuse_modules
-
-__all__ = [
-    "CENTRAL",
-    "GEOMETRIES",
-    "LINKAGES",
-    "Geometry",
-    "Linkage",
-    "Module",
-    "Moments",
-    "Pin",
-    "Plan",
-    "Sizes",
-    "Wiring",
-    "counter_clockwise",
-    "merged",
-    "plan_body",
-    "plan_modules",
-    "pooled_by_pin",
-    "refuse_modules",
-]

@@ -75,11 +75,5 @@ def full(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
     return output(parts, own, sizes) + hidden(parts, own, sizes) + feedback(parts, own, sizes)
 
 
-LINKAGES: dict[str, Linkage] = {
-    "none": none,
-    "output": output,
-    "hidden": hidden,
-    "feedback": feedback,
-    "full": full,
-}
+LINKAGES: dict[str, Linkage] = {"none": none, "output": output, "hidden": hidden, "feedback": feedback, "full": full}
 """Every linkage by its name on the command line."""

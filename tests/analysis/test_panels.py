@@ -7,62 +7,55 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from msgspec.structs import replace as changed
 
 from exneat_cli.analysis.catalogue import Panel
-from exneat_cli.analysis.robustness_panels import draw_clusters, draw_levels
-from exneat_cli.analysis.training_panels import common_curves, draw_areas, draw_each_run, draw_means
-from tests.analysis.figure_studies import LEVELS, SWEEPS, a_study
+from exneat_cli.analysis.panels import common_curves, draw_panel
+from exneat_cli.analysis.study import Study
+from tests.analysis.fake_studies import LEVELS, SWEEPS, a_study
 
-SWEPT = Panel("made_up", "noise", sweep="sensor_noise")
-TRAINED = Panel("made_up", "noise")
-
-
-def empty_axes() -> Axes:
-    return Figure().add_subplot()
+SWEPT = Panel("track", "calm", sweep="sensor_noise")
+KINDS = ("training", "training_runs", "area", "robustness", "cluster")
 
 
-def test_an_unfinished_run_does_not_count(tmp_path: Path) -> None:
-    study = a_study(tmp_path, seeds=2)
-    study.runs[0].directory.update_manifest(status="interrupted")
-    assert draw_means(empty_axes(), TRAINED, study, "generation") == {"neat": 1, "exneat": 2}
+def drawn(study: Study, kind: str, panel: Panel = SWEPT, axis: str = "generation") -> tuple[Axes, dict[str, int]]:
+    axes = Figure().add_subplot()
+    return axes, draw_panel(kind, axes, panel, study, axis)
 
 
-def test_an_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
-    study = a_study(tmp_path, swept=["exneat", "random"])
-    assert draw_levels(empty_axes(), SWEPT, study) == {"exneat": 3, "random": 1}
-    assert draw_clusters(empty_axes(), SWEPT, study) == {"exneat": 3, "random": 1}
+def test_a_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
+    study = a_study(tmp_path)
+    for run in study.of("calm", "neat"):
+        run.directory.robustness.unlink()
+    for kind in ("robustness", "cluster"):
+        assert drawn(study, kind)[1] == {"exneat": 3, "random": 1}
 
 
 def test_means_and_bands_are_those_of_the_runs(tmp_path: Path) -> None:
     study = a_study(tmp_path)
-    axes = empty_axes()
-    draw_means(axes, TRAINED, study, "generation")
-    best = study.history("noise", "exneat").pivot_table(index="generation", columns="seed", values="best_so_far")
-    line = axes.get_lines()[1]
-    np.testing.assert_allclose(line.get_ydata(), best.mean(axis=1))
+    axes, _ = drawn(study, "training")
+    history = study.history("calm")
+    best = history[history["variant"] == "exneat"].pivot(index="generation", columns="seed", values="best_so_far")
+    np.testing.assert_allclose(axes.get_lines()[1].get_ydata(), best.mean(axis=1))
     band = axes.collections[1].get_paths()[0].vertices
     for generation, runs in best.iterrows():
         low, *_, high = sorted(set(band[band[:, 0] == generation][:, 1]))
         assert runs.min() - 1e-9 <= low < runs.mean() < high <= runs.max() + 1e-9
 
 
-def test_a_single_run_has_a_line_and_no_band(tmp_path: Path) -> None:
-    study = a_study(tmp_path, seeds=1)
-    for draw in (
-        lambda axes: draw_means(axes, TRAINED, study, "generation"),
-        lambda axes: draw_levels(axes, SWEPT, study),
-    ):
-        axes = empty_axes()
-        draw(axes)
-        assert len(axes.get_lines()) >= 2
-        assert not axes.collections
+@pytest.mark.parametrize("kind", ["training", "robustness"])
+def test_a_single_run_has_a_line_and_no_band(tmp_path: Path, kind: str) -> None:
+    axes, _ = drawn(a_study(tmp_path, seeds=1), kind)
+    assert len(axes.get_lines()) >= 2
+    assert not axes.collections
 
 
 def test_every_run_is_drawn_beside_the_mean(tmp_path: Path) -> None:
-    axes = empty_axes()
-    counts = draw_each_run(axes, TRAINED, a_study(tmp_path, seeds=4), "generation")
+    axes, counts = drawn(a_study(tmp_path, seeds=4), "training_runs")
     assert counts == {"neat": 4, "exneat": 4}
     assert sum(line.get_linewidth() < 1.0 for line in axes.get_lines()) == 8
     assert sum(line.get_linewidth() > 2.0 for line in axes.get_lines()) == 2
@@ -78,43 +71,29 @@ def test_between_generations_a_run_keeps_its_latest_value_and_none_is_continued_
         }
     )
     curves = common_curves(history, "env_steps")
-    assert curves.x.tolist() == [15, 20, 25, 30]
-    assert curves.values.tolist() == [[1.0, 2.0, 2.0, 3.0], [10.0, 10.0, 20.0, 20.0]]
-    assert common_curves(history, "generation").x.tolist() == [1, 2, 3]
+    assert curves.index.tolist() == [15, 20, 25, 30]
+    assert curves.T.to_numpy().tolist() == [[1.0, 2.0, 2.0, 3.0], [10.0, 10.0, 20.0, 20.0]]
+    assert common_curves(history, "generation").index.tolist() == [1, 2, 3]
 
 
-def dashed(axes: Axes) -> list[np.ndarray]:
-    lines = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
-    return [np.asarray(line.get_ydata()) for line in lines if len(line.get_ydata())]
+@pytest.mark.parametrize("seeds", [5, 7])
+def test_the_dashed_line_is_the_mean_of_the_five_runs_best_on_validation_unless_these_are_all(
+    tmp_path: Path, seeds: int
+) -> None:
+    axes, _ = drawn(a_study(tmp_path, seeds=seeds), "robustness")
+    dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--" and len(line.get_ydata())]
+    fading = 1.0 - np.array(LEVELS)
+    np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), fading * (0.3 + 0.013 * np.mean(range(seeds))))
+    assert len(dashed) == (2 if seeds > 5 else 0)
+    for line in dashed[:1]:
+        np.testing.assert_allclose(line.get_ydata(), fading * (0.3 + 0.013 * np.mean([2, 3, 4, 5, 6])))
 
 
-def test_the_dashed_line_is_the_mean_of_the_five_runs_best_on_validation(tmp_path: Path) -> None:
-    axes = empty_axes()
-    draw_levels(axes, SWEPT, a_study(tmp_path, seeds=7))
-    height = 0.4
-    fading = height * (1.0 - np.array(LEVELS))
-    np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), fading + 0.01 * height * np.mean(range(7)))
-    np.testing.assert_allclose(dashed(axes)[0], fading + 0.01 * height * np.mean([2, 3, 4, 5, 6]))
-    assert len(dashed(axes)) == 2
-
-
-def test_there_is_no_dashed_line_where_five_runs_are_all_of_them(tmp_path: Path) -> None:
-    axes = empty_axes()
-    draw_levels(axes, SWEPT, a_study(tmp_path, seeds=5))
-    assert not dashed(axes)
-
-
-def test_levels_beyond_the_highest_are_left_out(tmp_path: Path) -> None:
-    axes = empty_axes()
-    draw_levels(axes, replace(SWEPT, highest=0.3), a_study(tmp_path))
-    assert axes.get_lines()[0].get_xdata().tolist() == [0.0, 0.1, 0.2, 0.3]
-
-
-def test_full_reward_is_drawn_and_named_where_the_panel_asks_for_it(tmp_path: Path) -> None:
-    study = a_study(tmp_path, scale=1000.0)
-    fitness, full = empty_axes(), empty_axes()
-    draw_levels(fitness, SWEPT, study)
-    draw_levels(full, replace(SWEPT, value="full_reward"), study)
+def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(tmp_path: Path) -> None:
+    study = a_study(tmp_path, has_full_reward=True)
+    panels = [changed(SWEPT, value=value, highest=0.3) for value in ("fitness", "full_reward")]
+    fitness, full = (drawn(study, "robustness", panel)[0] for panel in panels)
+    assert list(fitness.get_lines()[0].get_xdata()) == [0.0, 0.1, 0.2, 0.3]
     assert (fitness.get_ylabel(), full.get_ylabel()) == ("forward reward", "full reward")
     assert fitness.get_xlabel() == SWEEPS["sensor_noise"]
     one, other = (np.asarray(axes.get_lines()[0].get_ydata()) for axes in (fitness, full))
@@ -122,8 +101,7 @@ def test_full_reward_is_drawn_and_named_where_the_panel_asks_for_it(tmp_path: Pa
 
 
 def test_in_a_cluster_every_run_has_a_point_at_every_level_and_variants_do_not_mix(tmp_path: Path) -> None:
-    axes = empty_axes()
-    draw_clusters(axes, SWEPT, a_study(tmp_path, seeds=4))
+    axes, _ = drawn(a_study(tmp_path, seeds=4), "cluster")
     neat, exneat = [each for each in axes.collections if len(each.get_offsets()) == 4 * len(LEVELS)]
     for level in range(len(LEVELS)):
         left, right = (np.asarray(each.get_offsets())[4 * level : 4 * level + 4, 0] for each in (neat, exneat))
@@ -132,8 +110,20 @@ def test_in_a_cluster_every_run_has_a_point_at_every_level_and_variants_do_not_m
 
 
 def test_the_area_of_a_run_is_the_mean_of_its_best_so_far(tmp_path: Path) -> None:
+    axes, counts = drawn(a_study(tmp_path), "area")
+    assert counts == {"neat": 3, "exneat": 3}
+    np.testing.assert_allclose(
+        np.asarray(axes.collections[0].get_offsets())[:, 1], 0.75 * np.array([0.3, 0.313, 0.326])
+    )
+
+
+def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_path: Path) -> None:
     study = a_study(tmp_path)
-    axes = empty_axes()
-    assert draw_areas(axes, TRAINED, study, "generation") == {"neat": 3, "exneat": 3}
-    expected = [pd.read_csv(run.directory.history)["best_so_far"].mean() for run in study.of("noise", "neat")]
-    np.testing.assert_allclose(np.asarray(axes.collections[0].get_offsets())[:, 1], expected)
+    found = set()
+    for kind in KINDS:
+        for each in (study, replace(study, variants={"exneat": "ExNEAT", "random": "random actions"})):
+            axes, _ = drawn(each, kind)
+            handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))["ExNEAT"]
+            colour = handles.get_color() if hasattr(handles, "get_color") else handles.get_facecolor()[0][:3]
+            found.add(to_hex(colour))
+    assert len(found) == 1

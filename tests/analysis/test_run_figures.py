@@ -5,100 +5,78 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from matplotlib.figure import Figure
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
-from exneat_cli.analysis.figures import tick_levels
-from exneat_cli.records import HistoryRow, RunDirectory, merge_robustness, read_robustness, write_csv, write_history
-from tests.analysis.figure_studies import has_white_edges, write_robustness
+from exneat_cli.records import UNPERTURBED, RobustnessRow, RunDirectory, merge_robustness, write_csv, write_history
+from tests.analysis.fake_studies import contents, has_white_edges, history_row
 
 
-def a_run(directory: Path) -> RunDirectory:
-    run = RunDirectory(directory)
-    directory.mkdir(parents=True)
-    rows = [HistoryRow(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in range(1, 9)]
-    write_history(run.history, rows)
-    write_csv(
-        run.trace, ["step", "x", "y", "z", "forward_reward"], [(t, 0.1 * t, 0.01 * t * t, 0.5, 2.0) for t in range(50)]
-    )
-    return run
-
-
-def test_each_figure_is_written_as_png_and_svg(tmp_path: Path) -> None:
-    run = a_run(tmp_path / "run")
-    written = draw_training(run, "forward reward") + draw_path(run)
-    assert sorted(path.name for path in written) == ["path.png", "path.svg", "training.png", "training.svg"]
-    assert (run.plots / "training.png").read_bytes().startswith(b"\x89PNG")
-    assert "training fitness (forward reward)" in (run.plots / "training.svg").read_text()
-
-
-def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
-    one, other = a_run(tmp_path / "a" / "run"), a_run(tmp_path / "b" / "run")
-    for run in (one, other):
-        draw_training(run, "forward reward")
-        draw_path(run)
-    for path in one.plots.iterdir():
-        assert path.read_bytes() == (other.plots / path.name).read_bytes(), path.name
-
-
-def test_a_run_of_a_single_generation_can_be_drawn(tmp_path: Path) -> None:
-    run = a_run(tmp_path / "run")
-    write_history(run.history, [HistoryRow(1, 2.0, 1.0, 1.5, 2.0, 10, 500, 1, 96, 4, 0, 0, 0.1)])
-    assert draw_training(run, "fitness")
-
-
-def sweeps(count: int) -> dict[str, str]:
+def labels(count: int) -> dict[str, str]:
     return {f"sweep_{k}": f"label {k}" for k in range(count)}
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def a_run(directory: Path, sweeps: int = 1, generations: int = 8, place: str = "ground") -> RunDirectory:
+    run = RunDirectory(directory)
+    directory.mkdir(parents=True)
+    numbers = range(1, generations + 1)
+    rows = [history_row(g, 10.0 * g, 2.0 * g, 1.5 * g, 10.0 * g, g, g, 1, 96, 4, 0, 0, 0.1 * g) for g in numbers]
+    write_history(run.history, rows)
+    swept = [(sweep, level) for sweep in labels(sweeps) for level in (0.0, 0.5, 1.0)]
+    figures = [(place, 0.8 - 0.2 * place[1]) for place in [(UNPERTURBED, 0.0), *swept]]
+    merge_robustness(run.robustness, [RobustnessRow("exneat", 0, *at, 20, f, 0.1, f, 0.1) for at, f in figures])
+    if place == "tiles":
+        columns = ["row", "column", "path", "channel_1", "channel_2"]
+        write_csv(run.tiles, columns, [(r, c, int(r != c), 0.1 * r, 0.1 * c) for r in range(4) for c in range(5)])
+        columns = ["step", "row", "column", "goal_row", "goal_column", "prey_1_row", "prey_1_column", "prey_1_free"]
+        write_csv(run.trace, columns, [(t, t % 4, t // 2, 3, 4, 2, t % 3, int(t < 4)) for t in range(8)])
+    else:
+        columns = ["step", "x", "y"] if place == "ground" else ["step", "speed", "cost"]
+        write_csv(run.trace, columns, [(t, 0.1 * t, 0.01 * t * t) for t in range(50)])
+    return run
+
+
+def draw_all(run: RunDirectory) -> list[Path]:
+    return [*draw_training(run, "forward reward"), *draw_path(run), *draw_robustness(run, labels(4), "forward reward")]
+
+
+@pytest.mark.parametrize("place", ["ground", "tiles", "nowhere"])
+def test_the_same_data_gives_the_same_bytes_and_nothing_is_cut_off(tmp_path: Path, place: str) -> None:
+    one, other = (a_run(tmp_path / copy / "run", sweeps=4, place=place) for copy in ("a", "b"))
+    written = draw_all(one)
+    assert [path.stem for path in written] == ["training"] * 2 + ["path"] * 2 + ["robustness"] * 2
+    assert all(has_white_edges(path) for path in written if path.suffix == ".png")
+    assert "training fitness (forward reward)" in (one.plots / "training.svg").read_text()
+    draw_all(other)
+    assert contents(one.plots) == contents(other.plots)
+
+
+def test_a_run_of_a_single_generation_can_be_drawn(tmp_path: Path) -> None:
+    assert draw_training(a_run(tmp_path / "run", generations=1), "fitness")
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
 def test_robustness_has_a_panel_for_each_sweep_and_none_for_the_unperturbed_row(tmp_path: Path, count: int) -> None:
-    run = a_run(tmp_path / "run")
-    write_robustness(run, "exneat", 0, 0.8, sweeps(count))
-    written = draw_robustness(run, sweeps(count), "forward reward")
-    assert [path.name for path in written] == ["robustness.png", "robustness.svg"]
-    assert has_white_edges(written[0])
-    text = written[1].read_text()
-    assert [label for label in sweeps(9).values() if f"<!-- {label} -->" in text] == list(sweeps(count).values())
+    picture, drawing = draw_robustness(a_run(tmp_path / "run", sweeps=count), labels(count), "forward reward")
+    assert has_white_edges(picture)
+    text = drawing.read_text()
+    assert [label for label in labels(9).values() if f"<!-- {label} -->" in text] == list(labels(count).values())
     assert text.count("<!-- forward reward -->") == count
     assert "<!-- none -->" not in text
 
 
-def test_a_sweep_without_a_label_is_called_by_its_name(tmp_path: Path) -> None:
-    run = a_run(tmp_path / "run")
-    write_robustness(run, "exneat", 0, 0.8, sweeps(1))
-    assert "<!-- sweep_0 -->" in draw_robustness(run, {}, "fitness")[1].read_text()
+def test_without_labels_sweeps_are_called_by_their_names(tmp_path: Path) -> None:
+    assert "<!-- sweep_0 -->" in draw_robustness(a_run(tmp_path / "run"), {}, "fitness")[1].read_text()
 
 
 def test_a_run_that_was_never_swept_has_no_picture_of_robustness(tmp_path: Path) -> None:
-    run = a_run(tmp_path / "run")
-    write_robustness(run, "random", 0, 0.8, {})
+    run = a_run(tmp_path / "run", sweeps=0)
     assert draw_robustness(run, {}, "fitness") == []
     assert not run.plots.exists()
 
 
-def test_equal_robustness_gives_equal_bytes(tmp_path: Path) -> None:
-    one, other = a_run(tmp_path / "a" / "run"), a_run(tmp_path / "b" / "run")
-    for run in (one, other):
-        write_robustness(run, "exneat", 0, 0.8, sweeps(4))
-    for first, second in zip(*(draw_robustness(run, {}, "fitness") for run in (one, other)), strict=True):
-        assert first.read_bytes() == second.read_bytes()
-
-
 def test_of_a_level_that_was_tested_twice_the_longer_test_is_shown(tmp_path: Path) -> None:
-    once, twice = a_run(tmp_path / "a" / "run"), a_run(tmp_path / "b" / "run")
+    once, twice = (a_run(tmp_path / place / "run") for place in ("a", "b"))
+    merge_robustness(twice.robustness, [RobustnessRow("exneat", 0, "sweep_0", 0.5, 2, 9.0, 0.1, 9.0, 0.1)])
     for run in (once, twice):
-        write_robustness(run, "exneat", 0, 0.8, sweeps(1))
-    hasty = [row._replace(episodes=2, fitness_mean=9.0) for row in read_robustness(twice.robustness)]
-    merge_robustness(twice.robustness, hasty)
-    for first, second in zip(*(draw_robustness(run, {}, "fitness") for run in (once, twice)), strict=True):
-        assert first.read_bytes() == second.read_bytes()
-
-
-def test_an_axis_of_whole_levels_has_no_ticks_between_them() -> None:
-    tiles, shares = Figure().subplots(1, 2)
-    for axes, levels in ((tiles, [2.0, 3.0, 4.0]), (shares, [0.0, 0.5, 1.0])):
-        axes.plot(levels, levels)
-        tick_levels(axes, levels)
-    assert all(tick.is_integer() for tick in tiles.get_xticks())
-    assert not all(tick.is_integer() for tick in shares.get_xticks())
+        draw_robustness(run, {}, "fitness")
+    assert contents(once.plots) == contents(twice.plots)

@@ -1,4 +1,4 @@
-"""Tables of the catalogue from made-up runs: figures by hand, missing runs, equal bytes."""
+"""Tables from made-up runs: statistics by hand, what is left empty, missing runs, captions and equal bytes."""
 
 from __future__ import annotations
 
@@ -7,27 +7,30 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-import yaml
 
-from exneat_cli.analysis.catalogue import Column, TablePlan, TableRow, read_catalogue
+from exneat_cli.analysis.catalogue import Built, Column, TablePlan, TableRow, read_catalogue
 from exneat_cli.analysis.study import MissingRunsError, Study
-from exneat_cli.analysis.tables import build_table
+from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.errors import ExneatError
-from tests.analysis.fake_studies import finish, finish_all, plan_study, run_of, seen_anew
+from tests.analysis.fake_studies import contents, finish, finish_all, plan_study, run_of
 
-EXPERIMENTS = Path(__file__).parents[2] / "experiments"
+CATALOGUE = Path(__file__).parents[2] / "experiments" / "catalogue.yaml"
 SWEPT = {"noisy": Column(of="robustness", sweep="sensor_noise", level=0.3)}
 PLAIN = {"training": Column(of="training"), "test": Column(of="test"), "efficiency": Column(of="efficiency")}
+ROWS = (TableRow("track", "calm", "neat"), TableRow("track", "calm", "exneat"))
 
 
-def plan(columns: Mapping[str, Column], *rows: TableRow, note: str = "") -> TablePlan:
-    rows = rows or (TableRow("track", "calm", "neat"), TableRow("track", "calm", "exneat"))
-    return TablePlan("table-9.1", "Track", columns, rows, note)
+def built(study: Study, directory: Path, columns: Mapping[str, Column], *rows: TableRow, note: str = "") -> Built:
+    plan = TablePlan("table-9.1", "Track", dict(columns), rows or ROWS, note)
+    return build_table(plan, {"track": study}, directory / "report")
 
 
-def built_csv(directory: Path, study: Study, columns: Mapping[str, Column], *rows: TableRow) -> pd.DataFrame:
-    table = build_table(plan(columns, *rows), {"track": study}, directory / "report")
-    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str}).set_index(["variant", "quantity"])
+def csv_of(table: Built, *index: str) -> pd.DataFrame:
+    return pd.read_csv(table.paths[0], dtype={"mean": str, "published": str, "efficiency": str}).set_index(list(index))
+
+
+def lines_of(study: Study, directory: Path, columns: Mapping[str, Column], *rows: TableRow) -> pd.DataFrame:
+    return csv_of(built(study, directory, columns, *rows), "variant", "quantity")
 
 
 def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -> None:
@@ -39,204 +42,171 @@ def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -
         TableRow("track", "calm", "neat", {"training": 0.7869, "efficiency": ">20"}),
         TableRow("track", "calm", "exneat", {"training": 1.0, "efficiency": 7}),
     )
-    table = build_table(plan(PLAIN, *rows), {"track": study}, tmp_path / "report")
-    by_place = {row[1:3]: row for row in table.rows}
+    table = built(study, tmp_path, PLAIN, *rows)
     assert [row[1:3] for row in table.rows] == [(variant, q) for variant in ("NEAT", "ExNEAT") for q in PLAIN]
-    assert by_place["NEAT", "training"][:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
-    assert by_place["NEAT", "training"][6:] == ("0.300", "3", "", "")
-    assert by_place["ExNEAT", "training"][3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
-    assert by_place["ExNEAT", "test"][3:5] == ("", "0.400")
-    assert by_place["NEAT", "efficiency"][3:] == (">20", "2", "", "", "3", "", "")
-    assert by_place["ExNEAT", "efficiency"][3:] == ("7", "1", "", "", "3", "", "")
+    neat, _, neat_efficiency, exneat, exneat_test, exneat_efficiency = table.rows
+    assert neat[:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
+    assert neat[6:] == ("0.300", "3", "", "")
+    assert exneat[3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
+    assert exneat_test[3:5] == ("", "0.400")
+    assert neat_efficiency[3:] == (">20", "2", "", "", "3", "", "")
+    assert exneat_efficiency[3:] == ("7", "1", "", "", "3", "", "")
 
 
 def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_path: Path) -> None:
     study = finish_all(plan_study(tmp_path))
-    rows = [TableRow("track", "calm", variant) for variant in study.variants]
-    table = built_csv(tmp_path, study, PLAIN, *rows)
+    table = lines_of(study, tmp_path, PLAIN, *(TableRow("track", "calm", variant) for variant in study.variants))
     assert table.loc[("ExNEAT", "test"), "p_holm"] == pytest.approx(0.1)
     assert table.loc[("random actions", "test"), "mean"] == "0.45"
     assert table.loc[("random actions", "test"), ["low", "p_holm"]].isna().all()
     assert table.loc[("random actions", "efficiency"), ["mean", "published"]].isna().all()
 
 
-def test_an_variant_that_never_reaches_the_first_one_takes_more_than_all_generations(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=1)
-    finish(run_of(study, "calm", "neat", 0), (0.1, 0.2, 0.9))
-    finish(run_of(study, "calm", "exneat", 0), (0.1, 0.2, 0.8))
-    table = built_csv(tmp_path, study, PLAIN)
-    assert table.loc[("ExNEAT", "efficiency"), "mean"] == ">3"
-    assert table.loc[("NEAT", "efficiency"), "mean"] == "3"
-
-
-def test_efficiency_looks_at_the_mean_of_runs_not_at_single_runs(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=2)
-    for seed in range(2):
+def test_efficiency_is_when_the_mean_of_runs_reaches_that_of_the_first_variant_if_ever(tmp_path: Path) -> None:
+    study = plan_study(tmp_path, seeds=2, variants={"neat": "NEAT", "exneat": "ExNEAT", "fb": "fb"}, baselines=())
+    for seed, curve in enumerate([(0.9, 0.9, 0.9), (0.0, 0.1, 0.2)]):
         finish(run_of(study, "calm", "neat", seed), (0.1, 0.1, 0.5))
-    finish(run_of(study, "calm", "exneat", 0), (0.9, 0.9, 0.9))
-    finish(run_of(study, "calm", "exneat", 1), (0.0, 0.1, 0.2))
-    assert built_csv(tmp_path, study, PLAIN).loc[("ExNEAT", "efficiency"), "mean"] == "2"
+        finish(run_of(study, "calm", "exneat", seed), curve)
+        finish(run_of(study, "calm", "fb", seed), (0.1, 0.2, 0.4))
+    table = lines_of(study, tmp_path, PLAIN, *(TableRow("track", "calm", variant) for variant in study.variants))
+    assert [table.loc[(label, "efficiency"), "mean"] for label in study.variants.values()] == ["3", "2", ">3"]
 
 
-def test_csv_keeps_every_digit_where_markdown_rounds(tmp_path: Path) -> None:
+def test_csv_keeps_every_digit_where_markdown_rounds_and_zero_has_no_sign(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=1)
-    for variant in ("neat", "exneat"):
-        finish(run_of(study, "calm", variant, 0), (1 / 3,))
-    table = build_table(plan(PLAIN), {"track": study}, tmp_path / "report")
-    assert "0.3333333333333333," in table.paths[0].read_text()
-    assert "| 0.333 |" in table.paths[1].read_text()
-    assert "0.3333" not in table.paths[1].read_text()
-
-
-def test_large_figures_are_rounded_to_one_decimal(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=1)
-    for variant, end in (("neat", 812.3456), ("exneat", -3.2111)):
-        finish(run_of(study, "calm", variant, 0), (end,))
-    table = build_table(plan({"training": Column(of="training")}), {"track": study}, tmp_path / "report")
-    assert [row[4] for row in table.rows] == ["812.3", "-3.2"]
+    for variant, end in (("neat", 812.3456), ("exneat", -0.0111)):
+        finish(run_of(study, "calm", variant, 0), (end,), test=end / 1000)
+    table = built(study, tmp_path, PLAIN)
+    assert [row[4] for row in table.rows] == ["812.3", "0.812", "1", "0.0", "0.000", ">1"]
+    exact, readable = (path.read_text() for path in table.paths)
+    assert ",-0.0111," in exact
+    assert "| 0.0 |" in readable
 
 
 def test_robustness_is_that_of_its_sweep_level_and_value(tmp_path: Path) -> None:
-    levels = {
-        ("sensor_noise", 0.0): (0.9, 9.0),
-        ("sensor_noise", 0.1 + 0.2): (0.6, 6.0),
-        ("reset_noise", 0.3): (0.1, 1.0),
-    }
-    study = finish_all(plan_study(tmp_path), levels)
-    columns = {**SWEPT, "full": Column(of="robustness", sweep="sensor_noise", level=0.3, value="full_reward")}
-    table = built_csv(tmp_path, study, columns)
-    assert table.loc[("NEAT", "noisy"), "mean"] == "0.6"
-    assert table.loc[("NEAT", "full"), "mean"] == "6.0"
+    places = {("sensor_noise", 0.0): 0.9, ("sensor_noise", 0.1 + 0.2): 0.6, ("gap", 0.3): 0.1}
+    study = finish_all(plan_study(tmp_path), {place: (fitness, 10 * fitness) for place, fitness in places.items()})
+    full = Column(of="robustness", sweep="sensor_noise", level=0.3, value="full_reward")
+    table = lines_of(study, tmp_path, {**SWEPT, "full": full})
+    assert [table.loc[("NEAT", name), "mean"] for name in ("noisy", "full")] == ["0.6", "6.0"]
+    assert table.loc[("NEAT", "noisy"), "best_5"] == pytest.approx(0.6), "all, as there are fewer than five"
 
 
 def test_the_view_of_the_thesis_takes_the_five_runs_best_on_validation(tmp_path: Path) -> None:
     study = plan_study(tmp_path, seeds=7)
-    validation = [0.1, 0.9, 0.8, 0.2, 0.7, 0.6, 0.5]
-    for seed in range(7):
+    for seed, validation in enumerate([0.1, 0.9, 0.8, 0.2, 0.7, 0.6, 0.5]):
         for variant in ("neat", "exneat"):
             levels = {("sensor_noise", 0.3): (float(seed**2), 0.0)}
-            finish(run_of(study, "calm", variant, seed), (0.5,), validation=validation[seed], levels=levels)
-    table = built_csv(tmp_path, study, SWEPT)
-    assert table.loc[("NEAT", "noisy"), "best_5"] == pytest.approx((1 + 4 + 16 + 25 + 36) / 5)
-    assert float(table.loc[("NEAT", "noisy"), "mean"]) == pytest.approx(13.0)
+            finish(run_of(study, "calm", variant, seed), (0.5,), validation=validation, levels=levels)
+    line = lines_of(study, tmp_path, SWEPT).loc[("NEAT", "noisy")]
+    assert line["best_5"] == pytest.approx((1 + 4 + 16 + 25 + 36) / 5)
+    assert float(line["mean"]) == pytest.approx(13.0)
 
 
-def test_with_fewer_than_five_runs_the_view_of_the_thesis_takes_all(tmp_path: Path) -> None:
-    study = finish_all(plan_study(tmp_path), {("sensor_noise", 0.3): (0.4, 0.0)})
-    assert built_csv(tmp_path, study, SWEPT).loc[("NEAT", "noisy"), "best_5"] == pytest.approx(0.4)
-
-
-def test_an_variant_without_a_finished_run_is_an_error_with_the_command(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("finished", "missing"), [("neat", "ExNEAT"), ("exneat", "NEAT")])
+def test_a_table_needs_runs_of_its_variants_and_of_the_one_that_they_are_compared_with(
+    tmp_path: Path, finished: str, missing: str
+) -> None:
     study = plan_study(tmp_path)
-    finish(run_of(study, "calm", "neat", 0), (0.5,))
-    with pytest.raises(MissingRunsError, match=r"(?s)calm.*ExNEAT\n  exneat sweep experiment=track budget=quick"):
-        build_table(plan(PLAIN), {"track": seen_anew(study)}, tmp_path / "report")
+    finish(run_of(study, "calm", finished, 0), (0.5,))
+    with pytest.raises(MissingRunsError, match=rf"calm.* of {missing}\n  exneat sweep experiment=track budget=quick"):
+        built(study, tmp_path, PLAIN, TableRow("track", "calm", "exneat"))
     assert not (tmp_path / "report").exists()
 
 
-def test_an_variant_needs_the_one_that_it_is_compared_with(tmp_path: Path) -> None:
-    study = plan_study(tmp_path)
-    finish(run_of(study, "calm", "exneat", 0), (0.5,))
-    with pytest.raises(MissingRunsError, match="NEAT"):
-        build_table(plan(PLAIN, TableRow("track", "calm", "exneat")), {"track": study}, tmp_path / "report")
-
-
-@pytest.mark.parametrize("levels", [None, {("sensor_noise", 0.2): (0.4, 0.0)}, {("reset_noise", 0.3): (0.4, 0.0)}])
+@pytest.mark.parametrize("levels", [None, {("sensor_noise", 0.2): (0.4, 0.0)}, {("gap", 0.3): (0.4, 0.0)}])
 def test_a_level_that_was_not_measured_is_an_error_with_sweep_level_and_command(
     tmp_path: Path, levels: dict[tuple[str, float], tuple[float, float]] | None
 ) -> None:
     study = finish_all(plan_study(tmp_path), levels)
-    with pytest.raises(MissingRunsError, match=r"(?s)sensor_noise, level 0.3.*NEAT, ExNEAT\n  exneat sweep"):
-        build_table(plan(SWEPT), {"track": study}, tmp_path / "report")
+    with pytest.raises(MissingRunsError, match=r"sensor_noise, level 0.3.*NEAT, ExNEAT\n  exneat sweep"):
+        built(study, tmp_path, SWEPT)
 
 
-@pytest.mark.parametrize(
-    "row",
-    [
-        TableRow("walk", "calm", "neat"),
-        TableRow("track", "stormy", "neat"),
-        TableRow("track", "calm", "neta"),
-        TableRow("track", "calm", "neat", {"trainnig": 1.0}),
-    ],
-)
-def test_a_plan_that_names_something_unknown_is_refused(tmp_path: Path, row: TableRow) -> None:
-    study = finish_all(plan_study(tmp_path))
-    with pytest.raises(ExneatError, match=r"table-9.1.*expected"):
-        build_table(plan(PLAIN, row), {"track": study}, tmp_path / "report")
-
-
-def test_a_table_of_nothing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ExneatError, match="at least one row"):
-        build_table(plan({}), {"track": finish_all(plan_study(tmp_path))}, tmp_path / "report")
-
-
-def test_a_robustness_column_without_a_level_is_refused(tmp_path: Path) -> None:
-    columns = {"noisy": Column(of="robustness", sweep="sensor_noise")}
-    with pytest.raises(ExneatError, match="a sweep and a level"):
-        build_table(plan(columns), {"track": finish_all(plan_study(tmp_path))}, tmp_path / "report")
+@pytest.mark.parametrize("place", [("walk", "calm", "neat"), ("track", "stormy", "neat"), ("track", "calm", "neta")])
+def test_a_plan_that_names_something_unknown_is_refused(tmp_path: Path, place: tuple[str, str, str]) -> None:
+    with pytest.raises(ExneatError, match=r"table-9.1: .*expected one of .*, got"):
+        built(finish_all(plan_study(tmp_path)), tmp_path, PLAIN, TableRow(*place))
 
 
 def test_the_caption_counts_runs_and_warns_of_few(tmp_path: Path) -> None:
-    few = build_table(plan(PLAIN, note="A note."), {"track": finish_all(plan_study(tmp_path / "few"))}, tmp_path / "a")
-    many = finish_all(plan_study(tmp_path / "many", seeds=10))
-    enough = build_table(plan(PLAIN), {"track": many}, tmp_path / "b")
+    few = built(finish_all(plan_study(tmp_path / "few")), tmp_path / "few", PLAIN, note="A note.")
     assert few.caption.startswith("Budget quick; finished runs per condition: NEAT 3; ExNEAT 3.")
-    assert "too narrow below 10 runs" in few.caption
     assert few.caption.endswith("A note.")
-    assert "not exactly comparable" in few.caption
     assert "All variants had equal budgets of 400 training episodes per run" in few.caption
     assert few.caption in few.paths[1].read_text()
-    assert "NEAT 10; ExNEAT 10." in enough.caption
+    published = TableRow("track", "calm", "neat", {"efficiency": 7})
+    enough = built(finish_all(plan_study(tmp_path, seeds=10)), tmp_path, PLAIN, published)
+    for words in ("not exactly comparable", "published figures rest on a larger budget"):
+        assert words in enough.caption
+        assert words not in few.caption
+    assert "too narrow below 10 runs" in few.caption
     assert "too narrow" not in enough.caption
-    assert "  " not in enough.caption
-
-
-def test_the_caption_tells_unequal_budgets(tmp_path: Path) -> None:
-    study = plan_study(tmp_path, seeds=1)
-    finish(run_of(study, "calm", "neat", 0), (0.5,), episodes=300)
-    finish(run_of(study, "calm", "exneat", 0), (0.5,), episodes=400)
-    table = build_table(plan(PLAIN), {"track": study}, tmp_path / "report")
-    assert "unequal budgets of training episodes per run (NEAT 300; ExNEAT 400)" in table.caption
-
-
-def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
-    levels = {("sensor_noise", 0.3): (0.4, 0.0)}
-    for each in ("one", "other"):
-        study = finish_all(plan_study(tmp_path / each), levels)
-        build_table(plan({**PLAIN, **SWEPT}), {"track": study}, tmp_path / f"report-{each}")
-    for path in (tmp_path / "report-one").iterdir():
-        assert path.read_bytes() == (tmp_path / "report-other" / path.name).read_bytes(), path.name
 
 
 def test_a_bar_in_a_label_does_not_break_the_markdown(tmp_path: Path) -> None:
     study = finish_all(plan_study(tmp_path, conditions={"calm": "no|noise"}))
-    lines = build_table(plan(PLAIN), {"track": study}, tmp_path / "report").paths[1].read_text().splitlines()
-    widths = {line.replace("\\|", "").count("|") for line in lines if line.startswith("|")}
-    assert len(widths) == 1
-
-
-def study_of(experiment: str, directory: Path) -> Study:
-    content = yaml.safe_load((EXPERIMENTS / f"{experiment}.yaml").read_text(encoding="utf-8"))
-    study = plan_study(
-        directory,
-        variants={name: str(variant["label"]) for name, variant in content["variants"].items()},
-        baselines=[name for name in content["variants"] if name in ("random", "linear_fusion", "motionless")],
-        conditions={name: str(condition["label"]) for name, condition in content["conditions"].items()},
-        experiment=experiment,
-    )
-    swept = {("reset_noise", 0.2): (700.0, 1600.0), ("sensor_noise", 0.2): (650.0, 1500.0)}
-    return finish_all(study, swept)
+    lines = built(study, tmp_path, PLAIN).paths[1].read_text().splitlines()
+    assert len({line.replace("\\|", "").count("|") for line in lines if line.startswith("|")}) == 1
 
 
 def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(tmp_path: Path) -> None:
-    plans = [each for each in read_catalogue(EXPERIMENTS / "catalogue.yaml").values() if isinstance(each, TablePlan)]
-    experiments = sorted({row.experiment for each in plans for row in each.rows})
-    studies = {name: study_of(name, tmp_path) for name in experiments}
+    plans = [each for each in read_catalogue(CATALOGUE).values() if isinstance(each, TablePlan)]
     assert len(plans) == 5
+    levels = {(sweep, 0.2): (700.0, 1600.0) for sweep in ("reset_noise", "sensor_noise")}
     for each in plans:
-        table = build_table(each, studies, tmp_path / "report")
+        names = {row.variant: row.variant for row in each.rows}, {row.condition: row.condition for row in each.rows}
+        directory, experiment = tmp_path / each.name, each.rows[0].experiment
+        planned = plan_study(directory, variants=names[0], baselines=(), conditions=names[1], experiment=experiment)
+        table = build_table(each, {experiment: finish_all(planned, levels)}, tmp_path / "report")
         published = [str(figure) for row in each.rows for figure in row.published.values()]
-        printed = [row[3] for row in table.rows if row[3]]
-        assert sorted(printed) == sorted(published)
+        assert sorted(row[3] for row in table.rows if row[3]) == sorted(published)
         assert len(table.rows) == len(each.rows) * len(each.columns)
         assert {len(row) for row in table.rows} == {len(table.header)}
+
+
+def test_every_variant_is_compared_in_every_condition(tmp_path: Path) -> None:
+    table = build_comparison(finish_all(plan_study(tmp_path)), tmp_path / "report")
+    assert [path.name for path in table.paths] == ["comparison-track.csv", "comparison-track.md"]
+    assert {len(row) for row in table.rows} == {len(table.header)}
+    assert [row[:3] for row in table.rows] == [
+        (condition, variant, runs)
+        for condition in ("no noise", "much noise")
+        for variant, runs in (("NEAT", "3"), ("ExNEAT", "3"), ("random actions", "1"))
+    ]
+    lines = csv_of(table, "condition", "variant")
+    exneat, random = lines.loc[("no noise", "ExNEAT")], lines.loc[("no noise", "random actions")]
+    assert list(exneat[["training_mean", "test_mean", "test_p_holm", "test_a12"]]) == pytest.approx(
+        [0.413, 0.363, 0.1, 1.0]
+    )
+    assert exneat["efficiency"] == "3"
+    assert random["test_mean"] == pytest.approx(0.45)
+    assert random[["training_mean", "test_low", "test_p_holm", "efficiency"]].isna().all()
+
+
+def test_full_reward_is_compared_where_the_task_has_one_alone(tmp_path: Path) -> None:
+    for has_full_reward in (True, False):
+        study = finish_all(plan_study(tmp_path / str(has_full_reward), has_full_reward=has_full_reward))
+        table = build_comparison(study, tmp_path)
+        assert ("full reward" in table.header) == ("Fitness is forward reward" in table.caption) == has_full_reward
+        assert ("full_reward_mean" in csv_of(table, "condition")) == has_full_reward
+
+
+def test_what_has_not_been_run_is_left_out_or_empty_and_nothing_is_compared_with_it(tmp_path: Path) -> None:
+    study = plan_study(tmp_path)
+    with pytest.raises(MissingRunsError, match=r"track.*\n  exneat sweep experiment=track"):
+        build_comparison(study, tmp_path / "report")
+    finish(run_of(study, "noisy", "exneat", 0), (0.5,), test=0.4)
+    lines = csv_of(build_comparison(plan_study(tmp_path), tmp_path / "report"), "condition", "variant")
+    assert set(lines.index.get_level_values("condition")) == {"much noise"}
+    assert lines.loc[("much noise", "ExNEAT"), "test_mean"] == pytest.approx(0.4)
+    assert lines[["test_p_holm", "test_a12", "efficiency"]].isna().all(axis=None)
+    assert lines.loc[("much noise", "NEAT"), "runs"] == 0
+
+
+def test_the_same_data_gives_the_same_bytes(tmp_path: Path) -> None:
+    for each in ("one", "other"):
+        study = finish_all(plan_study(tmp_path / each), {("sensor_noise", 0.3): (0.4, 0.0)})
+        built(study, tmp_path / each, {**PLAIN, **SWEPT})
+        build_comparison(study, tmp_path / each / "report")
+    assert contents(tmp_path / "one" / "report") == contents(tmp_path / "other" / "report")

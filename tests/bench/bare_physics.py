@@ -77,7 +77,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
         VerificationError: a replay did not end where the episode did.
     """
     seeds, brains = workload.seeds, workload.brains()
-    simulation = TASK.open(training=False, reset_scale=0.1)
+    simulation = TASK.open(training=False)
     simulation.reset(simulation.world, generator(seeds.world))
     recordings = [record(TASK, simulation, lay_out(brains), b) for b in range(len(brains))]
     with open_runner(threads=1) as runner:
@@ -85,8 +85,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
             check_x("step by step", recording.final_x, float(runner.trace(brain, seeds).steps[-1, 0]))
         pairs = [
             Pair(
-                partial(seconds_of, partial(runner.run, [brain], [seeds])),
-                partial(_replay_one, simulation, recording),
+                partial(seconds_of, partial(runner.run, [brain], [seeds])), partial(_replay_one, simulation, recording)
             )
             for brain, recording in zip(brains, recordings, strict=True)
         ]

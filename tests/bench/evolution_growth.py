@@ -8,14 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from exneat_cli.algorithms import Coevolution, EvolutionSettings, neat_config
+from exneat_cli.algorithms import Coevolution, EvolutionSettings, Problem, Results
 from exneat_cli.brains import assemble_all
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import _Training
-from exneat_cli.seeding import stream
-from exneat_cli.wiring import Plan
-from exneat_cli.wiring.plan import Module, sensor_pins
+from exneat_cli.runs.training import Training
+from exneat_cli.wiring import Module, Pin, Plan
 from tests.bench.measurement import RATIO, Bar, Row, VerificationError, growth_ratios, seconds_of
 from tests.bench.two_threads import usable_cores
 from tests.bench.workload import PLAN as NEAT_PLAN
@@ -45,25 +43,21 @@ class Growing:
     """
 
     def __init__(self, plan: Plan, population: int, root: int) -> None:
-        self._plan, self._settings = plan, EvolutionSettings()
-        shapes = plan.subpopulation_shapes
-        self.coevolution = Coevolution(
-            [neat_config(self._settings, population, shape) for shape in shapes],
-            [stream(root, "evolution", index) for index in range(len(shapes))],
-            stream(root, "pairing"),
-        )
+        self._plan, settings = plan, EvolutionSettings()
+        self.coevolution = Coevolution(Problem(plan, settings, population, episodes=1, pairing="rank", seed=root))
         self._rng = np.random.default_rng(root)
-        self._teams = self.coevolution.ask()
+        self._teams = self.coevolution.ask().teams
 
     def advance(self) -> float:
         """Wall seconds of all that a generation is but its episodes: tell, ask and making the brains."""
-        return seconds_of(partial(self._advance, self._rng.standard_normal(len(self._teams)).tolist()))
+        teams = len(self._teams)
+        results = Results(self._rng.standard_normal((teams, 1)), np.zeros(teams, np.bool_))
+        return seconds_of(partial(self._advance, results))
 
-    def _advance(self, fitness: Sequence[float]) -> None:
-        self.coevolution.tell(fitness)
-        self._teams = self.coevolution.ask()
-        genomes = [team.genomes for team in self._teams]
-        assemble_all(self._plan, genomes, feed_forward=self._settings.feed_forward)
+    def _advance(self, results: Results) -> None:
+        self.coevolution.tell(results)
+        self._teams = self.coevolution.ask().teams
+        assemble_all(self._plan, [team.genomes for team in self._teams], feed_forward=True)
 
     @property
     def connections(self) -> float:
@@ -93,7 +87,7 @@ def legs(count: int) -> Plan:
             name=f"leg {k}",
             position=(0.0, 0.0),
             subpopulation=k,
-            pins=sensor_pins(range(inputs)),
+            pins=tuple(Pin(index) for index in range(inputs)),
             outputs=outputs,
             hidden=hidden,
             drives=tuple(range(k * outputs, (k + 1) * outputs)),
@@ -115,7 +109,7 @@ def _rows(name: str, sizes: Sequence[int], makers: Sequence[Callable[[int], Grow
             own += more
     notes = [
         f"{np.median(own):.4f} s, last {training.connections:,.0f} connections per team and "
-        f"{training.coevolution.species_count} species"
+        f"{training.coevolution.columns()['species']} species"
         for own, training in zip(seconds, trainings, strict=True)
     ]
     return [
@@ -140,12 +134,13 @@ def measure_growth_with_threads() -> Row:
     executors = [Executor("threads", threads) for threads in (cores, 1)]
     runners = [Runner(settings.task, settings.noise, executor, training=True) for executor in executors]
     with runners[0], runners[1]:
-        many, one = (_Training(settings, runner) for runner in runners)
-        rounds = [(seconds_of(many.advance), seconds_of(one.advance)) for _ in range(1 + THREAD_GENERATIONS)]
-    histories = [[row._replace(wall_seconds=0.0) for row in training.history] for training in (many, one)]
+        trainings = [Training.start(settings) for _ in runners]
+        turns = [partial(training.advance, runner) for training, runner in zip(trainings, runners, strict=True)]
+        rounds = [[seconds_of(turn) for turn in turns] for _ in range(1 + THREAD_GENERATIONS)]
+    histories = [[{**row, "wall_seconds": 0.0} for row in training.history] for training in trainings]
     if histories[0] != histories[1]:
         raise VerificationError("a training depends on the number of threads")
     ratios = [single / several for several, single in rounds[1:]]
-    steps = one.history[-1].env_steps
+    steps = trainings[0].history[-1]["env_steps"]
     note = f"{steps:,} steps in all; no bar: what one core more adds depends on what else the machine does"
     return Row(f"whole Ant generations, NEAT, {cores} threads / 1 thread, generations/s", RATIO, ratios, None, note)

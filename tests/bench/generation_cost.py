@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brain, Brains, RandomActions
+from exneat_cli.brains import Brains, RandomActions
 from exneat_cli.compiling import compiled
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import _Training
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import AntTask, Simulation
 from exneat_cli.tasks.robots.dynamics import AntWorld, rewind
@@ -53,11 +55,19 @@ class WatchedRunner(Runner):
     def __enter__(self) -> WatchedRunner:
         return self
 
-    def run(self, brains: Brains | Sequence[Brain] | RandomActions, episodes: Sequence[EpisodeSeeds]) -> Outcomes:
+    def run(
+        self,
+        brains: Brains | Sequence[Brains] | RandomActions,
+        episodes: Sequence[EpisodeSeeds],
+        *,
+        moments: bool = False,
+    ) -> Outcomes:
         """The same as without watching."""
         assert isinstance(brains, Brains)
         self.brains, self.episodes = brains, episodes
-        self.seconds = seconds_of(lambda: setattr(self, "outcomes", super(WatchedRunner, self).run(brains, episodes)))
+        began = time.perf_counter()
+        self.outcomes = super().run(brains, episodes, moments=moments)
+        self.seconds = time.perf_counter() - began
         return self.outcomes
 
 
@@ -82,7 +92,7 @@ class BarePhysics:
         assert isinstance(settings.task, AntTask)
         self._task = settings.task
         reset_scale = settings.noise.reset_scale
-        self._simulations = [self._task.open(training=True, reset_scale=reset_scale) for _ in range(threads)]
+        self._simulations = [self._task.open_disturbed(training=True, reset_scale=reset_scale) for _ in range(threads)]
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="physics")
 
     def __enter__(self) -> BarePhysics:
@@ -146,18 +156,19 @@ def compare_with_physics(variant: str) -> Row:
     Raises:
         VerificationError: an episode done again was another one.
     """
-    settings, threads = VARIANTS[variant], usable_cores()
+    settings, threads = replace(VARIANTS[variant], generations=1 + GENERATIONS), usable_cores()
     walls, ratios, episodes = [], [], []
     with (
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
         BarePhysics(settings, threads) as physics,
     ):
-        training = _Training(settings, runner)
-        for _ in range(1 + GENERATIONS):
-            walls.append(seconds_of(training.advance))
+        training = Training.start(settings)
+        while not training.is_over:
+            walls.append(seconds_of(partial(training.advance, runner)))
             episodes.append(runner.seconds)
             ratios.append(walls[-1] / physics.seconds(runner))
-    steps = training.history[-1].env_steps - training.history[0].env_steps
+    history = training.history
+    steps = history[-1]["env_steps"] - history[0]["env_steps"]
     note = (
         f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
         f"{np.median(episodes[1:]):.3f} s of it episodes"

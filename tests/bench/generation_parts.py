@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.algorithms import Coevolution
-from exneat_cli.records import HistoryRow, write_checkpoint, write_history
+from exneat_cli.records import write_checkpoint, write_history
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings, training
 from exneat_cli.tasks import Hunting
@@ -104,15 +104,11 @@ def _seconds_by_part(settings: RunSettings) -> list[dict[str, float]]:
         clock.timing(training, "assemble_all", BRAINS),
         clock.timing(Runner, "run", EPISODES),
     ):
-
-        def report(history: list[HistoryRow]) -> None:
+        advancing = training.Training.start(settings)
+        while not advancing.is_over:
+            advancing.advance(runner)
             with clock.counting(RECORDS):
-                write_history(Path(folder) / "history.csv", history)
-
-        def save(checkpoint: Any) -> None:
-            with clock.counting(RECORDS):
-                write_checkpoint(Path(folder), checkpoint, settings.full_hash)
+                write_history(Path(folder) / "history.csv", advancing.history)
+                write_checkpoint(Path(folder), advancing.checkpoint(), settings.full_hash)
             generations.append(clock.take())
-
-        training.evolve(settings, runner, report, save=save)
     return generations

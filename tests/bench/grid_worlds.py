@@ -19,7 +19,7 @@ from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
 from exneat_cli.tasks import TASKS, GeneralMaze, Hunting, Task
-from exneat_cli.wiring import Geometry, Plan, Wiring, plan_wiring
+from exneat_cli.wiring import Plan, plan_body
 from tests.bench.measurement import RATIO, SECONDS, Bar, Pace, Row, VerificationError, pace_ratios, seconds_of
 from tests.bench.plain_python_worlds import PlainHunting, PlainMaze, PlainOutcome, PlainWorld, run_episode
 
@@ -97,7 +97,7 @@ def compare_hunting(repetitions: int) -> Row:
 
 
 def _compare(task: Task, world: PlainWorld, repetitions: int) -> Row:
-    plan = plan_wiring(task, "neat", Geometry(), "none", Wiring(), hidden=RECURRENT.neat_hidden)
+    plan = plan_body(task, hidden=RECURRENT.neat_hidden)
     (shape,) = plan.subpopulation_shapes
     config = neat_config(RECURRENT, GENOMES, shape)
     genomes = list(Subpopulation(config, stream(ROOT_SEED, "evolution", 0)).genomes.values())
@@ -178,7 +178,7 @@ def measure_paper_training(task: str, algorithm: str) -> Row:
         train(_settings(task, algorithm, "smoke", output))
         settings = _settings(task, algorithm, "paper", output)
         seconds = seconds_of(partial(train, settings))
-        spent = settings.directory.read_manifest()["budget_spent"]
+        spent = settings.directory.read_manifest().budget_spent
     name = f"whole training, paper budget, {task}, {settings.variant}, 1 thread, warm compile cache"
     note = f"{spent['episodes']:,} training episodes, {spent['env_steps']:,} steps"
     return Row(name, SECONDS, [seconds], PAPER_BAR, note)

@@ -1,6 +1,6 @@
 """General maze and hunting as an ordinary user would write them: plain Python loops over NumPy arrays.
 
-The rules are those of `exneat_cli.tasks.grid.maze_dynamics` and `exneat_cli.tasks.grid.prey_dynamics` at their
+The rules are those of `exneat_cli.tasks.grid.maze` and `exneat_cli.tasks.grid.predator_prey` at their
 defaults; the random numbers are others.
 """
 

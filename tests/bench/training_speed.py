@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from exneat_cli.algorithms import EvolutionSettings, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble_all
-from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import evolve
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import stream, training_episodes
 from tests.bench.generation_cost import WatchedRunner
-from tests.bench.measurement import RATIO, Bar, Row, VerificationError
+from tests.bench.measurement import RATIO, Bar, Row, VerificationError, seconds_of
 from tests.bench.neat_population import Generation, NeatTraining, evaluate_genome
 from tests.bench.two_threads import usable_cores
 
@@ -49,7 +48,9 @@ def compare_with_neat_python(*, full: bool) -> Row:
         WatchedRunner(settings.task, settings.noise, Executor("threads", cores), training=True) as runner,
     ):
         theirs.warm_up()
-        evolve(replace(settings, generations=2, population=10), runner, lambda history: None)  # compiles
+        small = Training.start(replace(settings, generations=2, population=10))  # compiles
+        small.advance(runner)
+        small.advance(runner)
         _check_episodes(theirs, runner)
         ours, reference = _take_turns(settings, runner, theirs)
     ratios = [(a.steps / a.seconds) / (b.steps / b.seconds) for a, b in zip(ours, reference, strict=True)]
@@ -63,16 +64,11 @@ def _take_turns(
 ) -> tuple[list[Generation], list[Generation]]:
     ours: list[Generation] = []
     reference: list[Generation] = []
-    began = time.perf_counter()
-
-    def after_ours(history: Sequence[HistoryRow]) -> None:
-        nonlocal began
-        seconds = time.perf_counter() - began
+    training = Training.start(settings)
+    while not training.is_over:
+        seconds = seconds_of(partial(training.advance, runner))
         ours.append(Generation(int(runner.outcomes.steps.sum()), seconds, runner.seconds))
         reference.append(theirs.advance())
-        began = time.perf_counter()
-
-    evolve(settings, runner, after_ours)
     return ours, reference
 
 

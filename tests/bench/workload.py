@@ -9,11 +9,11 @@ import numpy as np
 
 from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, neat_config
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.brains import Brain, assemble
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import Geometry, Wiring, plan_wiring
+from exneat_cli.wiring import plan_body
 from tests.bench.measurement import VerificationError
 
 CANDIDATES = 100
@@ -22,7 +22,7 @@ ROOT_SEED = 0
 
 TASK = AntTask(max_steps=1000)
 SETTINGS = EvolutionSettings()
-PLAN = plan_wiring(TASK, "neat", Geometry(), "none", Wiring(), hidden=SETTINGS.neat_hidden)
+PLAN = plan_body(TASK, hidden=SETTINGS.neat_hidden)
 
 
 class Workload(NamedTuple):
@@ -46,7 +46,7 @@ class Workload(NamedTuple):
         """The same, a genome each."""
         return [self._replace(genomes=[genome]) for genome in self.genomes]
 
-    def brains(self) -> list[Brain]:
+    def brains(self) -> list[Brains]:
         """The genomes compiled."""
         return [assemble(PLAN, [genome], feed_forward=SETTINGS.feed_forward) for genome in self.genomes]
 
@@ -60,7 +60,7 @@ def find_workload(count: int) -> Workload:
     """The first `count` untrained genomes that do not fall.
 
     Raises:
-        VerificationError: too few of the random genomes keep upright, or nothing is compiled here.
+        VerificationError: too few of the random genomes keep upright.
     """
     (shape,) = PLAN.subpopulation_shapes
     config = neat_config(SETTINGS, CANDIDATES, shape)
@@ -68,8 +68,6 @@ def find_workload(count: int) -> Workload:
     (seeds,) = shared_episodes("test", 1)
     candidates = Workload(config, genomes, seeds)
     with open_runner(threads=1) as runner:
-        if not runner.compiled:
-            raise VerificationError("compiled code cannot call MuJoCo here, so there is nothing to measure")
         outcomes = runner.run(candidates.brains(), [seeds])
     upright = np.flatnonzero((outcomes.steps[:, 0] == TASK.max_steps) & ~outcomes.failed[:, 0])
     if len(upright) < count:

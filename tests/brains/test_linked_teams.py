@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable
 
 import neat
 import numpy as np
 import pytest
 
-from exneat_cli.algorithms import EvolutionSettings, from_stock, neat_config, to_stock
-from exneat_cli.algorithms.neat.stock_genome import HomologousGenome
-from exneat_cli.brains import Brain, assemble, linear_fusion, motionless
-from exneat_cli.brains.brain import Brains, activate, lay_out, memory_size
-from exneat_cli.tasks import AntTask, Part
-from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_wiring
+from exneat_cli.algorithms import RECURRENT, EvolutionSettings, from_stock, to_stock
+from exneat_cli.brains import Brains, assemble, assemble_all, linear_fusion, motionless
+from exneat_cli.brains.brain import activate, lay_out, memory_size
+from exneat_cli.tasks import AntTask
+from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_modules
+from tests.brains.teams import STEPS, Cross, actions_of, busy, random_team
 
-STEPS = 50
-ACTIVATIONS: dict[str, Callable[[float], float]] = {
-    "tanh": lambda z: math.tanh(2.5 * z),
-    "relu": lambda z: max(z, 0.0),
-}
+ACTIVATIONS: dict[str, Callable[[float], float]] = {"tanh": lambda z: math.tanh(2.5 * z), "relu": lambda z: max(z, 0.0)}
+GRID = busy(RECURRENT, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
 
 
 class SlowTeam:
@@ -33,12 +29,13 @@ class SlowTeam:
         self.feed_forward = feed_forward
         self.last: list[dict[int, float]] = [{} for _ in plan.modules]
 
-    def step(self, observation: np.ndarray) -> list[float]:
+    def step(self, sensed: np.ndarray) -> list[float]:
         now: list[dict[int, float]] = []
         for index, (module, genome) in enumerate(zip(self.plan.modules, self.genomes, strict=True)):
-            pins = self.pin_values(module, observation, now)
-            evaluate = self.forward if self.feed_forward else self.advance
-            now.append(evaluate(genome, pins, self.last[index]))
+            pins = self.pin_values(module, sensed, now)
+            now.append(
+                self.forward(genome, pins) if self.feed_forward else self.advance(genome, pins, self.last[index])
+            )
         self.last = now
         action = [0.0] * self.plan.action_size
         for module, values in zip(self.plan.modules, now, strict=True):
@@ -46,18 +43,16 @@ class SlowTeam:
                 action[actuator] = values.get(output, 0.0)
         return action
 
-    def pin_values(self, module: Module, observation: np.ndarray, now: list[dict[int, float]]) -> dict[int, float]:
+    def pin_values(self, module: Module, sensed: np.ndarray, now: list[dict[int, float]]) -> dict[int, float]:
         values = {}
         for k, pin in enumerate(module.pins):
-            if pin.kind == "sensor":
-                values[-1 - k] = float(observation[pin.index])
-                continue
-            node = pin.index + (self.plan.modules[pin.module].outputs if pin.kind == "hidden" else 0)
-            step = self.last if pin.delayed else now
-            values[-1 - k] = step[pin.module].get(node, 0.0)
+            if pin.is_sensor:
+                values[-1 - k] = float(sensed[pin.index])
+            else:
+                values[-1 - k] = (self.last if pin.delayed else now)[pin.module].get(pin.index, 0.0)
         return values
 
-    def forward(self, genome: neat.DefaultGenome, pins: dict[int, float], _: dict[int, float]) -> dict[int, float]:
+    def forward(self, genome: neat.DefaultGenome, pins: dict[int, float]) -> dict[int, float]:
         values: dict[int, float] = {}
 
         def value(key: int) -> float:
@@ -88,124 +83,80 @@ class SlowTeam:
         return values
 
 
-def random_team(plan: Plan, settings: EvolutionSettings, seed: int) -> list[neat.DefaultGenome]:
-    state = random.getstate()
-    random.seed(seed)
-    genomes = []
-    for shape in plan.subpopulation_shapes:
-        config = neat_config(settings, 10, shape, HomologousGenome)
-        config.genome_config.innovation_tracker = neat.innovation.InnovationTracker()
-        genome = config.genome_type(1)
-        genome.configure_new(config.genome_config)
-        for _ in range(random.randrange(30)):
-            genome.mutate(config.genome_config)
-        for gene in genome.connections.values():
-            gene.enabled = random.random() > 0.2
-        genomes.append(genome)
-    random.setstate(state)
-    return genomes
-
-
 def assert_equal_to_reference(plan: Plan, genomes: list[neat.DefaultGenome], feed_forward: bool, seed: int) -> None:
-    converted = [from_stock(genome) for genome in genomes]
-    brains = lay_out([assemble(plan, converted, feed_forward=feed_forward)])
-    slow = SlowTeam(plan, [to_stock(genome) for genome in converted], feed_forward)
-    observations = np.random.default_rng(seed).normal(size=(STEPS, plan.observation_size))
-    actions = actions_of(brains, 0, observations)
-    for action, observation in zip(actions, observations, strict=True):
-        np.testing.assert_allclose(action, slow.step(observation), rtol=1e-12, atol=0.0)
-
-
-def actions_of(brains: Brains, b: int, observations: np.ndarray) -> np.ndarray:
-    """(steps, A) what brain `b` does from its start on, given (steps, observation size)."""
-    memory = np.zeros(memory_size(brains))
-    actions = np.full((len(observations), brains.output_slot.shape[1]), np.nan)
-    for observation, action in zip(observations, actions, strict=True):
-        memory[: observation.size] = observation
-        activate(brains, b, memory, action)
-    return actions
-
-
-def busy(settings: EvolutionSettings, **changes: object) -> EvolutionSettings:
-    rates = dict.fromkeys(("node_add_prob", "node_delete_prob", "conn_add_prob", "conn_delete_prob"), 0.5)
-    return EvolutionSettings(**{**vars(settings), **rates, **changes})
+    arrays = [from_stock(genome) for genome in genomes]
+    brain = assemble(plan, arrays, feed_forward=feed_forward)
+    slow = SlowTeam(plan, [to_stock(genome) for genome in arrays], feed_forward)
+    sensed = np.random.default_rng(seed).normal(size=(STEPS, plan.observation_size))
+    for action, row in zip(actions_of(brain, 0, sensed), sensed, strict=True):
+        np.testing.assert_allclose(action, slow.step(row), rtol=1e-12, atol=0.0)
 
 
 @pytest.mark.parametrize("central", [True, False])
 @pytest.mark.parametrize("linkage", LINKAGES)
-def test_linked_ant_teams_equal_the_reference(ant_settings: EvolutionSettings, linkage: str, central: bool) -> None:
+def test_linked_ant_teams_equal_the_reference(linkage: str, central: bool) -> None:
     if linkage in ("feedback", "full") and not central:
         pytest.skip("these links need a central module")
     for seed, geometry in enumerate(["single", "fb", "lr", "cross", "all"]):
-        plan = plan_wiring(AntTask(), "exneat", Geometry(geometry), linkage, Wiring(central=central), hidden=4)
-        genomes = random_team(plan, busy(ant_settings), seed)
-        assert_equal_to_reference(plan, genomes, feed_forward=True, seed=seed)
+        plan = plan_modules(AntTask(), Geometry(geometry), linkage, Wiring(central=central), hidden=4)
+        assert_equal_to_reference(plan, random_team(plan, busy(EvolutionSettings()), seed), True, seed)
 
 
-class Cross:
-    """Four parts with two sensors and one actuator each, like the grid worlds'."""
-
-    name = "cross"
-    parts = tuple(
-        Part(name, (2 * k, 2 * k + 1), (k,), position)
-        for k, (name, position) in enumerate(
-            {"left": (-1.0, 0.0), "right": (1.0, 0.0), "up": (0.0, 1.0), "down": (0.0, -1.0)}.items()
-        )
-    )
-    trunk = None
-    observation_size = 8
-    actuator_names = ("left", "right", "up", "down")
+def cross_plan(geometry: str, linkage: str) -> Plan:
+    return plan_modules(Cross(), Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("linkage", ["none", "output", "hidden"])
-def test_linked_recurrent_teams_equal_the_reference(grid_settings: EvolutionSettings, linkage: str) -> None:
-    settings = busy(grid_settings, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
+def test_linked_recurrent_teams_equal_the_reference(linkage: str) -> None:
     for seed, geometry in enumerate(["single", "all", "all", "single"]):
-        plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
-        assert_equal_to_reference(plan, random_team(plan, settings, seed), feed_forward=False, seed=seed)
+        plan = cross_plan(geometry, linkage)
+        assert_equal_to_reference(plan, random_team(plan, GRID, seed), False, seed)
 
 
-def test_hidden_nodes_that_were_deleted_are_read_as_zero(ant_settings: EvolutionSettings) -> None:
-    plan = plan_wiring(AntTask(), "exneat", Geometry("single"), "hidden", Wiring(), hidden=4)
-    genomes = random_team(plan, ant_settings, 3)
-    part_genome = genomes[0]
+def test_hidden_nodes_that_were_deleted_are_read_as_zero() -> None:
+    plan = plan_modules(AntTask(), Geometry("single"), "hidden", Wiring(), hidden=4)
+    genomes = random_team(plan, busy(EvolutionSettings(), node_delete_prob=0.0), 3)
     for key in (2, 3, 4, 5):
-        part_genome.nodes.pop(key, None)
-        part_genome.connections = {ends: gene for ends, gene in part_genome.connections.items() if key not in ends}
-    assert_equal_to_reference(plan, genomes, feed_forward=True, seed=0)
+        genomes[0].nodes.pop(key)
+        genomes[0].connections = {ends: gene for ends, gene in genomes[0].connections.items() if key not in ends}
+    assert_equal_to_reference(plan, genomes, True, 0)
 
 
 def test_the_motionless_brain_holds_every_actuator_at_zero() -> None:
-    actions = actions_of(lay_out([motionless(105, np.zeros(8))]), 0, np.full((3, 105), 7.0))
-    assert not actions.any()
+    assert not actions_of(motionless(105, np.zeros(8)), 0, np.full((3, 105), 7.0)).any()
 
 
-def brains_of_many_sizes(settings: EvolutionSettings) -> list[Brain]:
+def brains_of_many_sizes() -> list[Brains]:
     """Feed-forward and recurrent teams, linked and not, and rules, all for the same body."""
     brains = [motionless(8, np.arange(4.0)), linear_fusion(8, 4, Cross.parts)]
     for feed_forward in (True, False):
         for seed, (geometry, linkage) in enumerate([("single", "hidden"), ("all", "none"), ("all", "output")]):
-            plan = plan_wiring(Cross(), "exneat", Geometry(geometry), linkage, Wiring(), hidden=2)  # type: ignore[arg-type]
-            genomes = [from_stock(genome) for genome in random_team(plan, settings, seed)]
-            brains.append(assemble(plan, genomes, feed_forward=feed_forward))
+            plan = cross_plan(geometry, linkage)
+            teams = [[from_stock(g) for g in random_team(plan, GRID, 2 * seed + k)] for k in range(2)]
+            brains.append(assemble_all(plan, teams, feed_forward=feed_forward))
     return brains
 
 
-def test_a_brain_among_many_of_other_sizes_does_exactly_what_it_does_alone(grid_settings: EvolutionSettings) -> None:
-    settings = busy(grid_settings, activation_default="tanh", bias_init_stdev=0.5, weight_init_stdev=0.5)
-    brains = brains_of_many_sizes(settings)
-    assert len({brain.size for brain in brains}) > 4
-    assert {brain.recurrent for brain in brains} == {True, False}
-    observations = np.random.default_rng(2).normal(size=(STEPS, 8))
-    for order in (brains, brains[::-1]):
-        together = lay_out(order)
-        for b, brain in enumerate(order):
-            alone = actions_of(lay_out([brain]), 0, observations)
-            np.testing.assert_array_equal(actions_of(together, b, observations), alone)
+def test_a_brain_among_many_of_other_sizes_does_exactly_what_it_does_alone() -> None:
+    alone = [some.part(b, b + 1) for some in brains_of_many_sizes() for b in range(len(some.size))]
+    assert len({int(brain.size[0]) for brain in alone}) > 4
+    sensed = np.random.default_rng(2).normal(size=(STEPS, 8))
+    expected = [actions_of(brain, 0, sensed) for brain in alone]
+    together = lay_out(brains_of_many_sizes())
+    assert set(together.recurrent.tolist()) == {True, False}
+    for b, actions in enumerate(expected):
+        np.testing.assert_array_equal(actions_of(together, b, sensed), actions)
+        np.testing.assert_array_equal(actions_of(together.part(b // 2, b + 1), b - b // 2, sensed), actions)
+        np.testing.assert_array_equal(actions_of(lay_out(alone[::-1]), len(alone) - 1 - b, sensed), actions)
 
 
-def test_a_brain_writes_to_no_more_memory_than_is_asked_for(grid_settings: EvolutionSettings) -> None:
-    brains = lay_out(brains_of_many_sizes(busy(grid_settings)))
+def test_brains_of_other_sizes_of_action_are_not_laid_out_together() -> None:
+    with pytest.raises(ValueError, match=r"all of one size .*, got \[\(8, 3\), \(8, 4\)\]"):
+        lay_out([motionless(8, np.zeros(4)), motionless(8, np.zeros(3))])
+
+
+def test_a_brain_writes_to_no_more_memory_than_is_asked_for() -> None:
+    brains = lay_out(brains_of_many_sizes())
     size = memory_size(brains)
     for b in range(len(brains.size)):
         memory, action = np.zeros(size + 10), np.zeros(4)

@@ -78,7 +78,7 @@ TRAIN = {
     "name=???": "name: Missing mandatory value",
     "output=": "output: expected a directory",
     "output=null": "output: expected a directory",
-    "output=[a]": "output: expected a directory, got ['a']",
+    "output=[a]": "output: expected a directory",
     "task=atn": "task=atn: no such option; known: ant, foraging, general_maze, hunting, track_maze",
     "task=": "task=: no such option; known: ant",
     "task=null": "task: expected the name of an option, got None",
@@ -217,11 +217,7 @@ CASES = [
 
 @pytest.mark.parametrize(("arguments", "named"), CASES, ids=[ascii(given) for given in (*TRAIN, *OTHERS)])
 def test_a_command_line_that_makes_no_sense_is_refused_before_anything_is_made(
-    arguments: list[str],
-    named: str,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str], named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").touch()
@@ -235,7 +231,7 @@ def test_an_output_that_cannot_be_made_is_refused(
     (tmp_path / "file").touch()
     long = "x" * 300
     train = ["train", "budget=smoke"]
-    check_refusal([*train, "output=file"], ["the run directory cannot be made"], tmp_path, capfd)
+    check_refusal([*train, "output=file"], ["the directory cannot be made"], tmp_path, capfd)
     check_refusal([*train, f"output={long}"], ["File name too long"], tmp_path, capfd)
     check_refusal(["inspect", f"run={long}"], ["no run is there"], tmp_path, capfd)
     if os.getuid() == 0:

@@ -85,7 +85,7 @@ def test_training_with_a_sweep_ends_with_its_rows_and_another_sweep_does_not_tra
     assert "finished already" in capsys.readouterr().out
     assert len(rows_of(tmp_path / "hunting", "exneat")) == 3
     manifest = RunDirectory(next((tmp_path / "hunting").iterdir())).read_manifest()
-    assert manifest["failed_robustness_episodes"] == {}
+    assert manifest.failed_robustness_episodes == {}
 
 
 @pytest.mark.parametrize("sweep", SWEEPS)

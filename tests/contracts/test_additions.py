@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 from exneat_cli.algorithms import (
     ALGORITHMS,
     Algorithm,
-    ArrayGenome,
     Candidate,
+    ExNEAT,
     Problem,
     Results,
     Search,
     State,
     Team,
     Trials,
-    neat_config,
     pack_teams,
     unpack_teams,
 )
@@ -127,20 +126,9 @@ class Draws(Search):
 
     def ask(self) -> Trials:
         if not self.second:
-            self.teams = [self._drawn(k) for k in range(self.problem.population)]
+            anew = replace(self.problem, seed=self.problem.seed + 1 + self.generation)
+            self.teams = list(ExNEAT().start(anew).ask().teams)
         return Trials(self.teams, self.problem.episodes)
-
-    def _drawn(self, number: int) -> Team:
-        key = self.generation * self.problem.population + number + 1
-        genomes = []
-        for index, shape in enumerate(self.problem.plan.subpopulation_shapes):
-            config = neat_config(self.problem.evolution, 2, shape).genome_config
-            config.chance.seed(hash((self.problem.seed, key, index)))
-            config.innovation_tracker = Numbers()
-            genome = ArrayGenome(key)
-            genome.configure_new(config)
-            genomes.append(genome)
-        return Team(tuple(genomes), (key,) * len(genomes))
 
     def tell(self, results: Results) -> bool:
         fitness = np.where(results.failed, -np.inf, results.fitness.mean(axis=1))
@@ -162,17 +150,6 @@ class Draws(Search):
 
     def columns(self) -> dict[str, int | float]:
         return {"record": self.fitness}
-
-
-class Numbers:
-    """Innovation numbers in the order of asking."""
-
-    def __init__(self) -> None:
-        self.last = 0
-
-    def get_innovation_number(self, *_: object) -> int:
-        self.last += 1
-        return self.last
 
 
 def opposite(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:

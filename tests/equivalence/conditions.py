@@ -9,20 +9,19 @@ from functools import partial
 import numpy as np
 import yaml
 
-from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, neat_config
+from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, Problem, Results
 from exneat_cli.brains import Brains, assemble_all
 from exneat_cli.brains.brain import activate, memory_size
 from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
-from exneat_cli.runs.training import evolve
-from exneat_cli.seeding import stream
+from exneat_cli.runs.training import Training
 from exneat_cli.tasks import TASKS
 from exneat_cli.wiring import Module, Pin, Plan
 
 XOR_INPUTS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
 XOR_TARGETS = np.array([0.0, 1.0, 1.0, 0.0])
-XOR_PLAN = Plan((Module("body", (0.0, 0.0), 0, (Pin("sensor", 0), Pin("sensor", 1)), 1, 1, (0,)),), 2, 1)
+XOR_PLAN = Plan((Module("body", (0.0, 0.0), 0, (Pin(0), Pin(1)), 1, 1, (0,)),), 2, 1)
 XOR_SETTINGS = EvolutionSettings(
     neat_hidden=1,
     weight_init_stdev=1.0,
@@ -38,14 +37,13 @@ XOR_GENERATIONS = 15
 def xor(genome: str, seed: int) -> float:
     """Best fitness of a population that is to learn exclusive or: 4 less the squared errors."""
     settings = dataclasses.replace(XOR_SETTINGS, genome=genome)
-    config = neat_config(settings, XOR_POPULATION, XOR_PLAN.subpopulation_shapes[0])
-    evolution = Coevolution([config], [stream(seed, "evolution", 0)], stream(seed, "pairing"))
+    evolution = Coevolution(Problem(XOR_PLAN, settings, XOR_POPULATION, episodes=1, pairing="rank", seed=seed))
     best = -np.inf
     for _ in range(XOR_GENERATIONS):
-        brains = assemble_all(XOR_PLAN, [team.genomes for team in evolution.ask()], feed_forward=True)
-        fitness = [_xor_fitness(brains, b) for b in range(XOR_POPULATION)]
-        evolution.tell(fitness)
-        best = max(best, *fitness)
+        brains = assemble_all(XOR_PLAN, [team.genomes for team in evolution.ask().teams], feed_forward=True)
+        fitness = np.array([[_xor_fitness(brains, b)] for b in range(XOR_POPULATION)])
+        evolution.tell(Results(fitness, np.zeros(XOR_POPULATION, np.bool_)))
+        best = max(best, float(fitness.max()))
     return best
 
 
@@ -73,7 +71,10 @@ def grid_world(task: str, sensor_std: float, genome: str, seed: int) -> float:
         **{key: paper[key] for key in ("generations", "population", "episodes")},
     )
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-        return evolve(settings, runner, lambda _: None).history[-1].best_so_far
+        training = Training.start(settings)
+        while not training.is_over:
+            training.advance(runner)
+    return float(training.history[-1]["best_so_far"])
 
 
 CONDITIONS: dict[str, Callable[[str, int], float]] = {

@@ -6,7 +6,6 @@ import io
 import json
 import os
 import pickle
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from exneat_cli.records import Checkpoint, read_checkpoints, write_checkpoint
+from exneat_cli.records.checkpoint import with_digest
 
 ARRAYS = {"0.current.id": np.arange(5), "0.current.node.bias": np.linspace(0.0, 1.0, 7)}
 PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}
@@ -39,16 +39,18 @@ def is_whole(found: Checkpoint | str, generation: int = 3) -> bool:
     return all(np.array_equal(found.arrays[name], column) for name, column in ARRAYS.items())
 
 
-def test_what_was_written_is_read_the_newest_first(tmp_path: Path) -> None:
+def test_what_was_written_is_read_the_newest_first_and_only_two_are_kept(tmp_path: Path) -> None:
     for generation in (9, 10, 11, 1000000):
         written(tmp_path, generation)
-    assert [found.generation for found in read(tmp_path) if isinstance(found, Checkpoint)] == [1000000, 11]
+    newest, before = read(tmp_path)
+    assert is_whole(newest, 1000000)
+    assert is_whole(before, 11)
     assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_it_is_a_plain_npz_that_needs_no_pickle(tmp_path: Path) -> None:
     with np.load(written(tmp_path), allow_pickle=False) as archive:
-        assert set(archive.files) == {*ARRAYS, "state", "digest"}
+        assert set(archive.files) == {*ARRAYS, "state"}
         assert json.loads(archive["state"].tobytes())["fitness"] == PLAIN["fitness"]
 
 
@@ -58,46 +60,25 @@ def test_a_number_that_is_not_finite_is_never_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_any_other_file_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "checkpoint-best.npz").write_bytes(b"mine")
-    written(tmp_path)
-    assert len(read(tmp_path)) == 1
-
-
-@given(position=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path, position: float, bit: int) -> None:
+@given(position=st.floats(0.0, 1.0, exclude_max=True), bit=st.none() | st.integers(0, 7))
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_flipped_bit_and_a_missing_end_are_noticed(tmp_path: Path, position: float, bit: int | None) -> None:
     path = written(tmp_path)
     data = bytearray(path.read_bytes())
-    data[int(position * len(data))] ^= 1 << bit
+    place = int(position * len(data))
+    if bit is None:
+        del data[place:]
+    else:
+        data[place] ^= 1 << bit
     path.write_bytes(bytes(data))
     (found,) = read(tmp_path)
-    assert isinstance(found, str) or is_whole(found)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
-def test_a_truncated_checkpoint_is_refused(tmp_path: Path, share: float) -> None:
-    path = written(tmp_path)
-    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    (found,) = read(tmp_path)
-    assert isinstance(found, str)
-    assert str(path) in found
+    assert str(found).startswith(f"{path}: damaged: ")
 
 
 def npz(compressed: bool = False, **members: np.ndarray) -> bytes:
     buffer = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(buffer, **members)  # type: ignore[arg-type]
-    return buffer.getvalue()
-
-
-def huge_shape() -> bytes:
-    header = b"\x93NUMPY\x01\x00" + (118).to_bytes(2, "little")
-    text = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000,), }".ljust(117) + b"\n"
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr("digest.npy", header + text)
-        archive.writestr("state.npy", header + text)
-    return buffer.getvalue()
+    return with_digest(buffer.getvalue())
 
 
 class Bomb:
@@ -109,14 +90,12 @@ class Bomb:
 
 FOREIGN = {
     "nothing": b"",
-    "text": b"hello",
-    "JSON": b'{"format": 1}',
-    "a pickle": pickle.dumps({"a": 1}),
-    "an NPZ of something else": npz(a=np.arange(3)),
-    "an NPZ with a pickled object": npz(state=np.array([Bomb()], dtype=object), digest=np.zeros(32, np.uint8)),
-    "a compressed NPZ": npz(compressed=True, state=np.zeros(10**6, np.uint8), digest=np.zeros(32, np.uint8)),
-    "a shape that no memory holds": huge_shape(),
-    "a wrong digest": npz(state=np.frombuffer(b"{}", np.uint8), digest=np.zeros(32, np.uint8)),
+    "JSON": with_digest(b'{"format": 1}'),
+    "a pickle": with_digest(pickle.dumps({"a": 1})),
+    "an NPZ with a pickled object": npz(state=np.array([Bomb()], dtype=object)),
+    "a compressed NPZ": npz(compressed=True, state=np.zeros(10**6, np.uint8)),
+    "a list": npz(state=np.frombuffer(b"[1]", np.uint8)),
+    "deep JSON": npz(state=np.full(10**5, ord("["), np.uint8)),
 }
 
 
@@ -129,14 +108,6 @@ def test_a_foreign_file_is_refused_by_its_path(tmp_path: Path, name: str) -> Non
     assert found.startswith(f"{path}: damaged")
 
 
-def test_the_checkpoint_before_a_damaged_one_is_still_read(tmp_path: Path) -> None:
-    written(tmp_path, 2)
-    written(tmp_path, 3).write_bytes(b"")
-    damaged, found = read(tmp_path)
-    assert isinstance(damaged, str)
-    assert is_whole(found, 2)
-
-
 def test_a_checkpoint_of_another_run_or_under_another_number_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, configuration_hash="other")
     assert "its configuration_hash is not hash" in str(read(tmp_path)[0])
@@ -146,16 +117,11 @@ def test_a_checkpoint_of_another_run_or_under_another_number_is_refused(tmp_path
 
 
 def test_a_damaged_checkpoint_of_a_later_generation_never_crowds_out_a_sound_one(tmp_path: Path) -> None:
-    for generation in (6, 7):
-        written(tmp_path, generation).write_bytes(b"damaged")
+    written(tmp_path, 6).write_bytes(b"damaged")
+    written(tmp_path, 7).unlink()
+    os.mkfifo(tmp_path / "checkpoint-000007.npz")
+    assert "expected a file, got a pipe" in str(read(tmp_path)[0])
     for generation in (1, 2, 3):
         written(tmp_path, generation)
         assert is_whole(read(tmp_path)[0], generation)
     assert [found.generation for found in read(tmp_path) if isinstance(found, Checkpoint)] == [3, 2]
-
-
-def test_a_pipe_in_a_checkpoints_place_is_refused_at_once(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "checkpoint-000003.npz")
-    (found,) = read(tmp_path)
-    assert isinstance(found, str)
-    assert "expected a file, got a pipe" in found

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
@@ -23,39 +21,22 @@ def test_a_new_row_replaces_the_old_one_of_its_level_and_no_other(tmp_path: Path
     assert read_robustness(path) == [row(UNPERTURBED, 0.0), row("a", 2.0), row("gap", 0.0), row("gap", 1.0, 0.9)]
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+def test_the_bytes_do_not_depend_on_the_order_of_the_rows(tmp_path: Path) -> None:
+    rows = [row(name, level, level / 3) for name in ("p_e", "gap") for level in (-1e300, 0.1 + 0.2, 5e-324, 7.0)]
+    merge_robustness(tmp_path / "a.csv", rows)
+    for each in reversed(rows):
+        merge_robustness(tmp_path / "b.csv", [each])
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    assert sorted(read_robustness(tmp_path / "a.csv")) == sorted(rows)
 
 
-@given(st.lists(st.tuples(st.sampled_from(["p_e", "gap"]), finite, finite), max_size=8), st.randoms())
-def test_the_bytes_do_not_depend_on_the_order_of_the_rows(
-    tmp_path_factory: pytest.TempPathFactory, entries: list[tuple[str, float, float]], random: object
-) -> None:
-    unique = list({(name, level): row(name, level, fitness) for name, level, fitness in entries}.values())
-    folder = tmp_path_factory.mktemp("rows")
-    merge_robustness(folder / "a.csv", unique)
-    random.shuffle(unique)  # type: ignore[attr-defined]
-    for each in unique:
-        merge_robustness(folder / "b.csv", [each])
-    assert not unique or (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
+HEADER = ",".join(RobustnessRow._fields) + "\n"
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "variant,run_seed\n",
-        "x\n",
-        ",".join(RobustnessRow._fields) + "\nneat,0,gap,nan,1,0,0,0,0\n",
-        "\x00",
-        "a,b\n1",
-    ],
-)
+@pytest.mark.parametrize("text", ["", "a,b\n1", "\x00", f"{HEADER}neat,0,gap,nan,1,0,0,0,0\n", f"{HEADER}neat,0\n"])
 def test_a_damaged_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robustness.csv"
+    assert read_robustness(path) == []
     path.write_text(text)
-    with pytest.raises(ExneatError, match=r"robustness\.csv: expected a table"):
+    with pytest.raises(ExneatError, match=r"robustness\.csv: (expected a table|damaged, at \[row\]\[column\])"):
         read_robustness(path)
-
-
-def test_a_file_that_is_not_there_has_no_rows(tmp_path: Path) -> None:
-    assert read_robustness(tmp_path / "robustness.csv") == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 
 from exneat_cli.records import HistoryRow
-from exneat_cli.runs import Lines
+from exneat_cli.runs import Progress
 
 
 def row(generation: int) -> HistoryRow:
@@ -15,7 +15,7 @@ def row(generation: int) -> HistoryRow:
 
 def test_a_log_gets_about_ten_lines_and_always_the_last_generation() -> None:
     stream = io.StringIO()
-    lines = Lines(stream)
+    lines = Progress(stream)
     lines.start("neat-s0", 95)
     for generation in range(1, 96):
         lines.generation(row(generation))

@@ -114,7 +114,7 @@ def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     assert any(text.startswith("going on after generation 2") for text in said)
 
 
-@pytest.mark.parametrize("name", ["write_hall_of_fame", "write_champion", "write_csv"])
+@pytest.mark.parametrize("name", ["write_hall_of_fame", "write_json", "write_csv"])
 def test_a_run_that_stops_after_training_trains_no_more(tmp_path: Path, name: str) -> None:
     undisturbed = content(train(small(tmp_path / "undisturbed")).directory)
     settings = small(tmp_path / "stopped")
@@ -187,11 +187,11 @@ def test_a_run_is_never_made_shorter(tmp_path: Path) -> None:
 def test_going_on_with_other_versions_is_said_and_noted(tmp_path: Path) -> None:
     settings = small(tmp_path)
     train_stopping(settings, "write_history", 3)
-    versions = settings.directory.read_manifest()["versions"]
+    versions = settings.directory.read_manifest().versions
     settings.directory.update_manifest(versions={**versions, "numpy": "1.0"})
     said = resumed(settings)[1]
     assert any(text.startswith("numpy 1.0 then") for text in said)
-    assert len(settings.directory.read_manifest()["resumed"]) == 1
+    assert len(settings.directory.read_manifest().resumed) == 1
 
 
 def test_a_checkpoint_of_another_run_is_not_gone_on_from(tmp_path: Path) -> None:

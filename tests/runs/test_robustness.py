@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import read_champion, read_robustness
@@ -86,7 +86,4 @@ def test_failed_episodes_of_a_level_are_counted_once_though_its_rows_were_lost(
         with pytest.raises(KeyboardInterrupt):
             run_robustness(directory, [sweep], episodes=3, executor=SERIAL)
     assert run_robustness(directory, [sweep], episodes=3, executor=SERIAL) == 2
-    assert directory.read_manifest()["failed_robustness_episodes"] == {
-        "p_m=0.0, 3 episodes": 2,
-        "p_m=0.5, 3 episodes": 2,
-    }
+    assert directory.read_manifest().failed_robustness_episodes == {"p_m=0.0, 3 episodes": 2, "p_m=0.5, 3 episodes": 2}

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
+from exneat_cli.records import Result, Score
 from exneat_cli.rollouts import Outcomes
 from exneat_cli.runs.scores import score_all, summary_sentence, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
@@ -47,14 +46,8 @@ def test_all_other_variants_face_the_very_same_test_episodes(algorithm: str) -> 
     assert draws == [[generator(seed).random() for seed in seeds] for seeds in shared_episodes("test", 3)]
 
 
-def figures(*fitness: float, failed: int = 0) -> dict[str, Any]:
-    return {
-        "episodes": len(fitness),
-        "fitness_mean": float(np.mean(fitness)),
-        "fitness_std": float(np.std(fitness)),
-        "failed_episodes": failed,
-        "fitness": list(fitness),
-    }
+def figures(*fitness: float, failed: int = 0) -> Score:
+    return Score(len(fitness), float(np.mean(fitness)), float(np.std(fitness)), 0.0, 0.0, failed, fitness)
 
 
 @pytest.mark.parametrize(
@@ -71,11 +64,8 @@ def figures(*fitness: float, failed: int = 0) -> dict[str, Any]:
 def test_the_verdict_needs_a_clear_difference_to_both_baselines(
     champion: tuple[float, ...], standing: tuple[float, ...], first: tuple[float, ...], verdict: str
 ) -> None:
-    result = {
-        "champion": figures(*champion),
-        "standing_still": figures(*standing),
-        "first_generation": figures(*first),
-    }
+    scores = [figures(*each) for each in (champion, standing, first)]
+    result = Result(champion=scores[0], standing_still=scores[1], first_generation=scores[2])
     sentence = summary_sentence(AntTask(), result)
     assert sentence.startswith(f"{verdict} on {len(champion)} test episodes")
     for each in (champion, standing, first):
@@ -83,5 +73,5 @@ def test_the_verdict_needs_a_clear_difference_to_both_baselines(
 
 
 def test_failed_episodes_of_the_champion_are_told() -> None:
-    result = {"champion": figures(5.0, -100.0, failed=1), "standing_still": figures(0.0, 0.0)}
+    result = Result(champion=figures(5.0, -100.0, failed=1), standing_still=figures(0.0, 0.0))
     assert "1 of 2 episodes failed" in summary_sentence(AntTask(), result)

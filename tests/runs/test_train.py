@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ def test_every_combination_that_makes_sense_trains(tmp_path: Path, geometry: str
     )
     finished = train(settings)
     assert len(history(finished.directory)) == 2
-    assert finished.result["champion"]["episodes"] == 2
+    assert finished.result.champion.episodes == 2
 
 
 @pytest.mark.parametrize("changes", [{"pairing": "index"}, {"episodes": 2}, {"noise": Noise(0.2, 0.0)}])
@@ -78,7 +79,7 @@ def test_random_actions_are_tested_without_training(tmp_path: Path) -> None:
     with finished.directory.robustness.open() as file:
         (row,) = csv.DictReader(file)
     assert (row["variant"], row["parameter"], row["level"], row["episodes"]) == ("random", "none", "0.0", "2")
-    assert float(row["fitness_mean"]) == finished.result["champion"]["fitness_mean"]
+    assert float(row["fitness_mean"]) == finished.result.champion.fitness_mean
     assert finished.summary.startswith("No training: on 2 test episodes the baseline earned")
 
 
@@ -124,26 +125,28 @@ def test_a_finished_run_is_found_not_trained_again(tmp_path: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in first.directory.path.iterdir()} == before
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_an_interrupted_run_can_be_done_again_with_the_same_bytes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     undisturbed = train(tiny(tmp_path / "a"))
 
     def interrupt(*arguments: object) -> None:
-        raise KeyboardInterrupt
+        patch.setattr("exneat_cli.runs.run.signal_heard", lambda: signal.SIGINT)
+        raise error
 
     with monkeypatch.context() as patch:
         patch.setattr("exneat_cli.runs.run.write_history", interrupt)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(error):
             train(tiny(tmp_path / "b"))
     directory = tiny(tmp_path / "b").directory
-    assert directory.read_manifest()["status"] == "interrupted"
+    assert directory.read_manifest().status == "interrupted"
     with pytest.raises(ExneatError, match="resume=true"):
         train(tiny(tmp_path / "b"))
     train(tiny(tmp_path / "b", resume=True))
     assert without_time(directory) == without_time(undisturbed.directory)
     assert directory.champion.read_bytes() == undisturbed.directory.champion.read_bytes()
-    assert directory.read_manifest()["status"] == "done"
+    assert directory.read_manifest().status == "done"
 
 
 def test_the_champion_in_the_file_earns_the_figures_beside_it(tmp_path: Path) -> None:
@@ -153,7 +156,7 @@ def test_the_champion_in_the_file_earns_the_figures_beside_it(tmp_path: Path) ->
     assert champion.plan == settings.plan
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         (tested,) = score_brains(runner, [champion.brain()], "test", settings.test_episodes)
-    assert json.loads(json.dumps(vars(tested))) == champion.scores["test"] == finished.result["champion"]
+    assert tested == champion.scores.test == finished.result.champion
 
 
 def test_the_champion_is_the_best_of_the_hall_of_fame_on_validation(tmp_path: Path) -> None:
@@ -164,15 +167,15 @@ def test_the_champion_is_the_best_of_the_hall_of_fame_on_validation(tmp_path: Pa
     assert [entry["validation_fitness"] for entry in hall] == sorted(
         (entry["validation_fitness"] for entry in hall), reverse=True
     )
-    assert hall[0]["validation_fitness"] == scores["validation"]["fitness_mean"]
-    assert hall[0]["training_fitness"] == scores["training"]["fitness"]
+    assert hall[0]["validation_fitness"] == scores.validation.fitness_mean
+    assert hall[0]["training_fitness"] == scores.training["fitness"]
 
 
 def test_training_stops_early_but_the_test_does_not(tmp_path: Path) -> None:
     finished = train(tiny(tmp_path, task=AntTask(max_steps=300, patience=5, progress=1.0), generations=1))
     (row,) = history(finished.directory)
     assert int(row["env_steps"]) == 6 * 5
-    assert finished.result["standing_still"]["full_reward_mean"] > 250
+    assert finished.result.standing_still.full_reward_mean > 250
 
 
 def test_the_written_configuration_reads_back_as_the_same_run(tmp_path: Path) -> None:
@@ -180,7 +183,7 @@ def test_the_written_configuration_reads_back_as_the_same_run(tmp_path: Path) ->
     finished = train(settings)
     again = RunSettings.from_plain(yaml.safe_load(finished.directory.config.read_text()))
     assert again == settings
-    assert again.full_hash == finished.directory.read_manifest()["configuration_hash"]
+    assert again.full_hash == finished.directory.read_manifest().configuration_hash
 
 
 def test_a_run_whose_first_write_fails_leaves_no_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,8 +233,8 @@ def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
     with pytest.raises(ExneatError, match="no team ever finished"):
         train(tiny(tmp_path))
     manifest = tiny(tmp_path).directory.read_manifest()
-    assert manifest["status"] == "failed"
-    assert "no team ever finished" in manifest["error"]
+    assert manifest.status == "failed"
+    assert "no team ever finished" in str(manifest.error)
     assert [row["failed_episodes"] for row in history(tiny(tmp_path).directory)] == ["6", "6"]
 
 

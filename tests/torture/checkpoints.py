@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from exneat_cli.records import Checkpoint, read_checkpoints
-from exneat_cli.runs import RunSettings, train, training
+from exneat_cli.runs import RunSettings, train
+from exneat_cli.runs.training import Training
 from exneat_cli.tasks import AntTask, TrackMaze
 from exneat_cli.wiring import Geometry
 from tests.torture.damages import cut, flipped, foreign, impossible, put, torn
@@ -26,8 +27,6 @@ _RUNS = {
     ),
     "track maze": RunSettings(task=TrackMaze(), geometry=Geometry("all"), linkage="output", seed=1, **_SMALL),
 }
-_NO_RUNNER: Any = None
-"""Restoring runs nothing."""
 
 
 class _Original(NamedTuple):
@@ -108,7 +107,7 @@ def _restore(original: _Original, data: bytes) -> str:
     said: list[str] = []
     try:
         checkpoints = read_checkpoints(newest.parent, settings.full_hash)
-        restored = training._begin_or_go_on(settings, _NO_RUNNER, checkpoints, said.append)
+        restored = Training.resumed(settings, checkpoints, said.append)
         generation = len(restored.history)
         if generation == 0:
             return "began from the beginning"

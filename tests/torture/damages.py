@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.records import checkpoint as checkpoint_file
+from exneat_cli.records.checkpoint import with_digest
 
 Arrays = dict[str, NDArray[Any]]
 Plain = dict[str, Any]
@@ -40,13 +40,13 @@ def torn(data: bytes, chance: random.Random) -> bytes:
 
 
 def foreign(data: bytes, other_run: bytes, other_generation: bytes, chance: random.Random) -> dict[str, bytes]:
-    """Whole files that are no checkpoint of this run and generation, by what they are."""
-    numbers = {"a": np.arange(3), "state": np.zeros(3, np.uint8), "digest": np.zeros(32, np.uint8)}
+    """Whole files that are no checkpoint of this run and generation, by what they are; some have a right digest."""
+    numbers = {"a": np.arange(3), "state": np.zeros(3, np.uint8)}
     return {
         "empty": _NOTHING,
         "random bytes": chance.randbytes(len(data)),
         "JSON": json.dumps({"generation": 2}).encode(),
-        "a pickle": pickle.dumps({"generation": 2}),
+        "a pickle": with_digest(pickle.dumps({"generation": 2})),
         "another NPZ": _npz(np.savez, numbers),
         "an NPZ without members": _npz(np.savez, {}),
         "an NPZ with pickles": _npz(np.savez, {**numbers, "b": np.array([{}, []], object)}),
@@ -64,7 +64,7 @@ def foreign(data: bytes, other_run: bytes, other_generation: bytes, chance: rand
 def _npz(save: Callable[..., None], members: Mapping[str, NDArray[Any]]) -> bytes:
     buffer = io.BytesIO()
     save(buffer, **members)
-    return buffer.getvalue()
+    return with_digest(buffer.getvalue())
 
 
 def _zip(members: Mapping[str, bytes]) -> bytes:
@@ -72,7 +72,7 @@ def _zip(members: Mapping[str, bytes]) -> bytes:
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in members.items():
             archive.writestr(name, content)
-    return buffer.getvalue()
+    return with_digest(buffer.getvalue())
 
 
 def _header(kind: str, shape: tuple[int, ...]) -> bytes:
@@ -89,12 +89,10 @@ def impossible(data: bytes) -> Iterator[tuple[str, bytes]]:
     """Checkpoints with a right digest whose content cannot have come from a run, with what is wrong in words."""
     for name, spoil in {**_WRONG_COLUMNS, **_WRONG_STATE}.items():
         arrays = _load(data)
-        del arrays["digest"]
         plain = json.loads(arrays.pop("state").tobytes())
         spoil(plain, arrays)
         arrays["state"] = np.frombuffer(json.dumps(plain).encode(), np.uint8)
-        digest = np.frombuffer(checkpoint_file._digest(arrays), np.uint8)
-        yield name, _npz(np.savez, {**arrays, "digest": digest})
+        yield name, _npz(np.savez, arrays)
 
 
 Spoil = Callable[[Plain, Arrays], object]
@@ -104,9 +102,9 @@ def _column(name: str, change: Callable[[NDArray[Any]], object]) -> Spoil:
     """Change a column of the first subpopulation, or put another in its place."""
 
     def spoil(plain: Plain, arrays: Arrays) -> None:
-        column = arrays[f"0.current.{name}"].copy()
+        column = arrays[f"current.0.{name}"].copy()
         changed = change(column)
-        arrays[f"0.current.{name}"] = changed if isinstance(changed, np.ndarray) else column
+        arrays[f"current.0.{name}"] = changed if isinstance(changed, np.ndarray) else column
 
     return spoil
 
@@ -117,18 +115,18 @@ def _set(place: int, value: float) -> Callable[[NDArray[Any]], object]:
 
 def _close_a_cycle(plain: Plain, arrays: Arrays) -> None:
     """Let the first connection between a sensor and a node run from the node to itself."""
-    arrays["0.current.connection.source"] = arrays["0.current.connection.source"].copy()
-    arrays["0.current.connection.source"][0] = arrays["0.current.connection.target"][0]
-    order = arrays["0.current.connections"][0]
+    arrays["current.0.connection.source"] = arrays["current.0.connection.source"].copy()
+    arrays["current.0.connection.source"][0] = arrays["current.0.connection.target"][0]
+    order = arrays["current.0.connections"][0]
     rows = sorted(range(order), key=lambda k: _ends(arrays, k))
-    for name in [name for name in arrays if name.startswith("0.current.connection.")]:
+    for name in [name for name in arrays if name.startswith("current.0.connection.")]:
         column = arrays[name].copy()
         column[:order] = column[:order][rows]
         arrays[name] = column
 
 
 def _ends(arrays: Arrays, row: int) -> tuple[int, int]:
-    return int(arrays["0.current.connection.target"][row]), int(arrays["0.current.connection.source"][row])
+    return int(arrays["current.0.connection.target"][row]), int(arrays["current.0.connection.source"][row])
 
 
 def _state(*path: Any, value: Any) -> Spoil:
@@ -143,12 +141,12 @@ def _state(*path: Any, value: Any) -> Spoil:
     return spoil
 
 
-_FIRST = ("coevolution", "subpopulations", 0)
+_FIRST = ("search", "subpopulations", 0)
 _NAN = float("nan")
 _WRONG_COLUMNS: dict[str, Spoil] = {
-    "a missing column": lambda plain, arrays: arrays.pop("0.current.node.bias"),
+    "a missing column": lambda plain, arrays: arrays.pop("current.0.node.bias"),
     "a missing subpopulation": lambda plain, arrays: [
-        arrays.pop(name) for name in list(arrays) if name.startswith("0.current.")
+        arrays.pop(name) for name in list(arrays) if name.startswith("current.0.")
     ],
     "a NaN weight": _column("connection.weight", _set(0, np.nan)),
     "an infinite bias": _column("node.bias", _set(0, np.inf)),
@@ -165,26 +163,26 @@ _WRONG_COLUMNS: dict[str, Spoil] = {
     "a connection from an unknown node": _column("connection.source", _set(0, 10**9)),
     "a connection from an unknown sensor": _column("connection.source", _set(0, -(10**9))),
     "an unknown activation": _column("node.activation", _set(0, 99)),
+    "an unknown team in the hall of fame": lambda plain, arrays: _name_strangers(arrays, "hall_of_fame.ids"),
+    "an unknown first team": lambda plain, arrays: _name_strangers(arrays, "first_generation.ids"),
     "a network without outputs": lambda plain, arrays: _empty_first_genome(arrays),
     "a network that feeds itself": _close_a_cycle,
 }
 _WRONG_STATE: dict[str, Spoil] = {
     "a negative generation": _state("generation", value=-2),
     "no history": _state("history", value=[]),
-    "a NaN in the history": _state("history", 0, 1, value=_NAN),
-    "a history that lacks a column": _state("history", 0, value=lambda row: row[:-1]),
-    "a word in the history": _state("history", 0, 1, value="much"),
+    "a NaN in the history": _state("history", 0, "best_fitness", value=_NAN),
+    "a history that lacks a column": lambda plain, arrays: plain["history"][0].pop("best_so_far"),
+    "a word in the history": _state("history", 0, "best_fitness", value="much"),
     "rows of history in another order": _state("history", value=lambda rows: rows[::-1]),
-    "a NaN in the hall of fame": _state("hall_of_fame", 0, 1, value=_NAN),
-    "an unknown team in the hall of fame": _state("hall_of_fame", 0, 0, value=lambda ids: [10**9] * len(ids)),
-    "a hall of fame of the future": _state("hall_of_fame", 0, 2, value=99),
-    "an unknown first team": _state("first_generation", value=lambda ids: [10**9] * len(ids)),
-    "a NaN fitness": _state("coevolution", "fitness", 0, value=_NAN),
-    "a fitness too few": _state("coevolution", "fitness", value=lambda values: values[:-1]),
-    "a team too few": _state("coevolution", "teams", value=lambda teams: teams[:-1]),
-    "an unknown team": _state("coevolution", "teams", 0, 0, value=10**9),
-    "a team that comes twice": _state("coevolution", "teams", value=lambda teams: [teams[1], *teams[1:]]),
-    "a subpopulation too many": _state("coevolution", "subpopulations", value=lambda all_: [*all_, all_[0]]),
+    "a NaN in the hall of fame": _state("search", "hall_of_fame", 0, 0, value=_NAN),
+    "a hall of fame of the future": _state("search", "hall_of_fame", 0, 1, value=99),
+    "a NaN fitness": _state("search", "fitness", 0, value=_NAN),
+    "a fitness too few": _state("search", "fitness", value=lambda values: values[:-1]),
+    "a team too few": _state("search", "teams", value=lambda teams: teams[:-1]),
+    "an unknown team": _state("search", "teams", 0, 0, value=10**9),
+    "a team that comes twice": _state("search", "teams", value=lambda teams: [teams[1], *teams[1:]]),
+    "a subpopulation too many": _state("search", "subpopulations", value=lambda all_: [*all_, all_[0]]),
     "no random state": _state(*_FIRST, "random", value=None),
     "a random state that is too short": _state(*_FIRST, "random", 1, value=lambda words: words[:-1]),
     "a random state of words": _state(*_FIRST, "random", 1, value=lambda words: ["a"] * len(words)),
@@ -197,20 +195,24 @@ _WRONG_STATE: dict[str, Spoil] = {
     "a negative next species": _state(*_FIRST, "next_species", value=-5),
     "the next node below those there are": _state(*_FIRST, "next_node", value=0),
     "a next genome of words": _state(*_FIRST, "next_genome", value="ten"),
-    "a pairing generator of another kind": _state("coevolution", "pairing", value={"bit_generator": "MT19937"}),
-    "a list in place of the state": _state("coevolution", value=[]),
+    "a pairing generator of another kind": _state("search", "pairing", value={"bit_generator": "MT19937"}),
+    "a list in place of the state": _state("search", value=[]),
 }
 
 
 def _empty_first_genome(arrays: Arrays) -> None:
-    nodes, connections = int(arrays["0.current.nodes"][0]), int(arrays["0.current.connections"][0])
+    nodes, connections = int(arrays["current.0.nodes"][0]), int(arrays["current.0.connections"][0])
     for name in list(arrays):
-        for prefix, many in (("0.current.node.", nodes), ("0.current.connection.", connections)):
+        for prefix, many in (("current.0.node.", nodes), ("current.0.connection.", connections)):
             if name.startswith(prefix):
                 arrays[name] = arrays[name][many:]
-    for name in ("0.current.nodes", "0.current.connections"):
+    for name in ("current.0.nodes", "current.0.connections"):
         arrays[name] = arrays[name].copy()
         arrays[name][0] = 0
+
+
+def _name_strangers(arrays: Arrays, name: str) -> None:
+    arrays[name] = np.full_like(arrays[name], 10**9)
 
 
 def put(path: Path, data: bytes) -> None:

@@ -8,14 +8,14 @@ import signal
 import tempfile
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 
 from exneat_cli.records import HistoryRow
 from exneat_cli.rollouts import Executor
-from exneat_cli.runs import RunSettings, Silence, train
+from exneat_cli.runs import Progress, RunSettings, train
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry
 from tests.torture.findings import Finding, exactly
@@ -40,14 +40,13 @@ class Killed:
     seconds_undisturbed: float
 
 
-@dataclass
-class _Killer(Silence):
+class _Killer(Progress):
     """Kills one worker in every generation, at a moment drawn at random, until it has killed enough."""
 
-    times: int
-    rng: random.Random
-    kills: int = 0
-    threads: list[threading.Thread] = field(default_factory=list)
+    def __init__(self, times: int, rng: random.Random) -> None:
+        super().__init__()
+        self.times, self.rng, self.kills = times, rng, 0
+        self.threads: list[threading.Thread] = []
 
     def generation(self, row: HistoryRow) -> None:
         if len(self.threads) < self.times:
@@ -111,7 +110,7 @@ def _settings(output: Path, executor: Executor, times: int, seed: int) -> RunSet
     )
 
 
-def _results(settings: RunSettings, progress: Silence | None = None) -> list[bytes]:
+def _results(settings: RunSettings, progress: Progress | None = None) -> list[bytes]:
     run = train(settings, progress=progress).directory
     history = [line.rpartition(b",")[0] for line in run.history.read_bytes().splitlines()]
     return [*((run.path / name).read_bytes() for name in RESULTS), *history]

@@ -7,19 +7,22 @@ from dataclasses import replace
 
 import pytest
 
+from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings
 from exneat_cli.errors import ConfigError
-from exneat_cli.tasks import AntTask
-from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, counter_clockwise, plan_wiring
+from exneat_cli.tasks import AntTask, Task
+from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, counter_clockwise, plan_body, plan_modules
 
-NAMED = ("single", "fb", "lr", "cross", "all")
+AROUND = ["front_left", "back_left", "back_right", "front_right"]
 
 
-def ant_plan(geometry: str = "all", linkage: str = "none", *, central: bool | None = None, width: int = 2) -> Plan:
-    return plan_wiring(AntTask(), "exneat", Geometry(geometry), linkage, Wiring(central, width), hidden=4)
+def ant_plan(
+    geometry: str = "all", linkage: str = "none", *, central: bool | None = None, width: int = 2, hidden: int = 4
+) -> Plan:
+    return plan_modules(AntTask(), Geometry(geometry), linkage, Wiring(central, width), hidden=hidden)
 
 
 def test_neat_is_one_module_that_senses_and_drives_everything() -> None:
-    plan = plan_wiring(AntTask(), "neat", Geometry(), "none", Wiring(), hidden=6)
+    plan = plan_body(AntTask(), hidden=6)
     assert plan.subpopulation_shapes == ((105, 6, 8),)
     (body,) = plan.modules
     assert body.sensors == tuple(range(105))
@@ -36,47 +39,34 @@ def test_sizes_are_those_of_the_design() -> None:
     assert ant_plan("single", central=False).subpopulation_shapes == ((22, 4, 2),)
 
 
-@pytest.mark.parametrize("geometry", NAMED)
-def test_a_central_module_adds_one_subpopulation(geometry: str) -> None:
-    without = ant_plan(geometry, central=False)
-    assert len(ant_plan(geometry).subpopulation_shapes) == len(without.subpopulation_shapes) + 1
-    assert ant_plan(geometry).modules[-1].drives == tuple(range(8))
-    assert sorted(a for module in without.modules for a in module.drives) == list(range(8))
+def test_every_actuator_is_driven_once_with_and_without_a_central_module() -> None:
+    assert ant_plan().modules[-1].drives == tuple(range(8))
+    assert sorted(a for module in ant_plan(central=False).modules for a in module.drives) == list(range(8))
 
 
 def test_peers_come_counter_clockwise_from_the_own_leg() -> None:
     legs = AntTask().parts
-    around = ["front_left", "back_left", "back_right", "front_right"]
     for own, leg in enumerate(legs):
-        start = around.index(leg.name)
-        assert [legs[peer].name for peer in counter_clockwise(legs, own)] == (around * 2)[start + 1 : start + 4]
+        start = AROUND.index(leg.name)
+        assert [legs[peer].name for peer in counter_clockwise(legs, own)] == (AROUND * 2)[start + 1 : start + 4]
 
 
-def test_links_of_a_shared_genome_mean_the_same_at_every_leg() -> None:
-    plan = ant_plan("single", "full")
-    around = ["front_left", "back_left", "back_right", "front_right"]
-    names = [module.name for module in plan.modules]
+def test_links_of_a_shared_genome_mean_the_same_at_every_leg_and_are_delayed() -> None:
+    *legs, central = ant_plan("single", "full").modules
     patterns = set()
-    for module in plan.modules[:-1]:
-        start = around.index(module.name)
-        peers = [
-            (pin.kind, pin.index, (around.index(names[pin.module]) - start) % 4)
-            for pin in module.pins
-            if pin.kind != "sensor" and names[pin.module] != "central"
+    for leg, part in zip(legs, AntTask().parts, strict=True):
+        start = AROUND.index(leg.name)
+        links = [pin for pin in leg.pins if not pin.is_sensor]
+        feedback = [pin.index for pin in links if pin.module == len(legs)]
+        assert tuple(feedback[:2]) == part.actuators
+        assert AntTask().actuator_names[feedback[0]].startswith("hip")
+        turns = [
+            (pin.index, (AROUND.index(legs[pin.module].name) - start) % 4) for pin in links if pin.module < len(legs)
         ]
-        joints = [AntTask().actuator_names[p.index] for p in module.pins if p.kind == "output" and p.module == 4]
-        assert joints[0].startswith("hip")
-        own = AntTask().parts[names.index(module.name)].actuators
-        assert tuple(p.index for p in module.pins if p.kind == "output" and p.module == 4)[:2] == own
-        patterns.add(tuple(peers))
+        patterns.add(tuple(turns))
+        assert all(pin.delayed for pin in links)
     assert len(patterns) == 1
-
-
-def test_only_the_central_modules_view_of_its_encoders_is_undelayed() -> None:
-    for module in ant_plan(linkage="full").modules:
-        for pin in module.pins:
-            if pin.kind != "sensor":
-                assert pin.delayed == (module.name != "central")
+    assert not any(pin.delayed for pin in central.pins)
 
 
 @pytest.mark.parametrize(("linkage", "central"), list(itertools.product(LINKAGES, [True, False])))
@@ -90,7 +80,7 @@ def test_links_that_read_a_central_module_need_one(linkage: str, central: bool) 
 
 def test_hidden_links_need_hidden_nodes() -> None:
     with pytest.raises(ConfigError, match=r"evolution\.module_hidden"):
-        plan_wiring(AntTask(), "exneat", Geometry(), "hidden", Wiring(), hidden=0)
+        ant_plan("single", "hidden", hidden=0)
 
 
 def test_an_output_width_without_a_central_module_is_refused() -> None:
@@ -98,9 +88,7 @@ def test_an_output_width_without_a_central_module_is_refused() -> None:
         ant_plan(central=False, width=3)
 
 
-@pytest.mark.parametrize(
-    "pin", [Pin("sensor", 105), Pin("sensor", -1), Pin("output", 2, 0), Pin("hidden", 4, 0), Pin("output", 0, 9)]
-)
+@pytest.mark.parametrize("pin", [Pin(105), Pin(-1), Pin(6, 0), Pin(12, 4), Pin(0, 9)])
 def test_a_plan_that_reads_what_does_not_exist_is_refused(pin: Pin) -> None:
     plan = ant_plan(linkage="full")
     plan.check()
@@ -110,7 +98,7 @@ def test_a_plan_that_reads_what_does_not_exist_is_refused(pin: Pin) -> None:
 
 
 def test_a_plan_that_drives_what_does_not_exist_is_refused() -> None:
-    (body,) = plan_wiring(AntTask(), "neat", Geometry(), "none", Wiring(), hidden=6).modules
+    (body,) = plan_body(AntTask(), hidden=6).modules
     with pytest.raises(ValueError, match="body drives an actuator that does not exist"):
         Plan((replace(body, drives=(0, 8)),), 105, 8).check()
     with pytest.raises(ValueError, match="more actuators than it has outputs"):
@@ -133,7 +121,11 @@ def test_algorithms_without_modules_refuse_what_is_about_modules(
     algorithm: str, geometry: str, linkage: str, wiring: Wiring, key: str
 ) -> None:
     with pytest.raises(ConfigError, match=f"{key}: .*\n.*algorithm={algorithm}"):
-        plan_wiring(AntTask(), algorithm, Geometry(geometry), linkage, wiring, hidden=4)
+        ALGORITHMS[algorithm](algorithm).plan(AntTask(), Geometry(geometry), linkage, wiring, EvolutionSettings())
+
+
+def planned(task: Task, geometry: str = "single", central: bool | None = None) -> Plan:
+    return plan_modules(task, Geometry(geometry), "none", Wiring(central), hidden=4)
 
 
 def test_sharers_of_different_widths_are_refused() -> None:
@@ -141,11 +133,11 @@ def test_sharers_of_different_widths_are_refused() -> None:
         @property
         def parts(self):  # type: ignore[no-untyped-def]
             one, *others = super().parts
-            return (type(one)(one.name, one.sensors[:-1], one.actuators, one.position), *others)
+            return (replace(one, sensors=one.sensors[:-1]), *others)
 
     with pytest.raises(ConfigError, match="sharers of equal widths"):
-        plan_wiring(Lopsided(), "exneat", Geometry("single"), "none", Wiring(), hidden=4)
-    assert plan_wiring(Lopsided(), "exneat", Geometry("all"), "none", Wiring(), hidden=4)
+        planned(Lopsided())
+    assert planned(Lopsided(), "all")
 
 
 def test_a_central_module_is_refused_where_there_is_no_trunk() -> None:
@@ -153,6 +145,13 @@ def test_a_central_module_is_refused_where_there_is_no_trunk() -> None:
         trunk = None  # type: ignore[assignment]
 
     with pytest.raises(ConfigError, match="no trunk"):
-        plan_wiring(Trunkless(), "exneat", Geometry(), "none", Wiring(central=True), hidden=4)
-    plan = plan_wiring(Trunkless(), "exneat", Geometry(), "none", Wiring(), hidden=4)
-    assert "central" not in [module.name for module in plan.modules]
+        planned(Trunkless(), central=True)
+    assert "central" not in [module.name for module in planned(Trunkless()).modules]
+
+
+def test_a_plan_is_made_of_what_brains_sense_not_of_what_sensors_read() -> None:
+    class InAnotherFrame(AntTask):
+        sensed_size = 200  # type: ignore[assignment]
+
+    assert planned(InAnotherFrame()).observation_size == 200
+    assert plan_body(InAnotherFrame(), hidden=0).subpopulation_shapes == ((200, 0, 8),)

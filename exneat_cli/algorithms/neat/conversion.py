@@ -26,9 +26,18 @@ def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
 
 
 def to_stock(genome: ArrayGenome) -> neat.DefaultGenome:
-    """The same genome as neat-python's own, for its networks and tools."""
-    converted = stock_genome(genome.key, genome.nodes, genome.connections, neat.DefaultGenome)
+    """The same genome as neat-python's own, with its genes in the same order."""
+    converted = neat.DefaultGenome(genome.key)
     converted.fitness = genome.fitness
+    for key, bias, response, activation in genome.nodes.tolist():
+        node = DefaultNodeGene(key)
+        node.bias, node.response, node.activation = bias, response, ACTIVATIONS[activation]
+        node.aggregation, node.time_constant = "sum", 1.0
+        converted.nodes[key] = node
+    for target, source, innovation, weight, enabled in genome.connections.tolist():
+        gene = DefaultConnectionGene((source, target), innovation=innovation)
+        gene.weight, gene.enabled = weight, enabled
+        converted.connections[source, target] = gene
     return converted
 
 
@@ -48,28 +57,8 @@ def tables_of(genome: ArrayGenome | neat.DefaultGenome) -> tuple[Nodes, Connecti
 
 
 def _node_row(gene: DefaultNodeGene) -> tuple[int, float, float, int]:
-    if gene.aggregation != "sum":
-        raise ExneatError(f"node {gene.key}: expected aggregation sum, got {gene.aggregation!r}")
-    if gene.time_constant != 1.0:
-        raise ExneatError(f"node {gene.key}: expected a time constant of 1, got {gene.time_constant!r}")
-    if gene.activation not in ACTIVATIONS:
-        known = ", ".join(ACTIVATIONS)
-        raise ExneatError(f"node {gene.key}: expected an activation of {known}, got {gene.activation!r}")
+    if gene.aggregation != "sum" or gene.time_constant != 1.0 or gene.activation not in ACTIVATIONS:
+        expected = f"aggregation sum, time constant 1 and an activation of {', '.join(ACTIVATIONS)}"
+        came = f"{gene.aggregation}, {gene.time_constant} and {gene.activation}"
+        raise ExneatError(f"node {gene.key}: expected {expected}, got {came}")
     return gene.key, gene.bias, gene.response, ACTIVATIONS.index(gene.activation)
-
-
-def stock_genome(
-    key: int, nodes: Nodes, connections: Connections, kind: type[neat.DefaultGenome]
-) -> neat.DefaultGenome:
-    """A genome of neat-python's, or of a class that extends it, with these genes in this order."""
-    genome = kind(key)
-    for node_key, bias, response, activation in nodes.tolist():
-        node = DefaultNodeGene(node_key)
-        node.bias, node.response, node.activation = bias, response, ACTIVATIONS[activation]
-        node.aggregation, node.time_constant = "sum", 1.0
-        genome.nodes[node_key] = node
-    for target, source, innovation, weight, enabled in connections.tolist():
-        gene = DefaultConnectionGene((source, target), innovation=innovation)
-        gene.weight, gene.enabled = weight, enabled
-        genome.connections[source, target] = gene
-    return genome

@@ -1,22 +1,22 @@
-"""Settings of evolution, and their translation into neat-python's configuration."""
+"""Settings of evolution, under neat-python's names; `conf/evolution` spells them with a comment each."""
 
 from __future__ import annotations
 
-from configparser import ConfigParser
+import dataclasses
+import math
 from dataclasses import dataclass
-from typing import Any
-
-import neat
 
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
-from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.initial_connections import INITIAL_CONNECTIONS
-from exneat_cli.algorithms.neat.reproduction import SteadyReproduction
-from exneat_cli.algorithms.neat.stock_genome import HomologousGenome
-from exneat_cli.errors import ExneatError, check_choice, check_flag, check_real, check_whole
-from exneat_cli.interruption import scratch_directory
+from exneat_cli.errors import check_choice, check_flag, check_real, check_whole
 
-GENOMES = {"array": ArrayGenome, "stock": HomologousGenome}
+INITIAL_CONNECTIONS = ("full_nodirect", "full_direct", "unconnected", "fs_neat_nohidden", "fs_neat_hidden")
+"""neat-python's names; ``fs_neat`` connects one input (Whiteson et al., "Automatic feature selection in
+neuroevolution", 2005)."""
+
+_CHOICES = {"genome": ("array", "stock"), "activation_default": ACTIVATIONS, "initial_connection": INITIAL_CONNECTIONS}
+_AT_LEAST_ONE = ("min_species_size", "max_stagnation")
+_SHARES = ("_rate", "_prob", "survival_threshold")
+"""Endings of the names of what is a probability; other real numbers are only not negative."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,8 @@ class EvolutionSettings:
         initial_connection: connections of the first generation.
         neat_hidden, module_hidden: initial hidden nodes of NEAT's network, and of every ExNEAT module.
         positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
-        weight_init_stdev, bias_init_stdev: initial values are N(0, sd).
-        weight_mutate_power, bias_mutate_power: a mutation adds N(0, power).
-        weight_mutate_rate, bias_mutate_rate: share of values that a mutation shifts.
-        weight_replace_rate, bias_replace_rate: share of values that a mutation draws anew.
-        weight_max_value, bias_max_value: values stay within these, on both sides of 0.
+        weight_*, bias_*: initial values are N(0, init_stdev); a mutation adds N(0, mutate_power) to the share
+            mutate_rate and draws the share replace_rate anew; values stay in [-max_value, max_value].
         enabled_mutate_rate: share of connections whose enabled flag a mutation draws anew.
         conn_add_prob, conn_delete_prob, node_add_prob, node_delete_prob: chance of each structural mutation.
         compatibility_disjoint_coefficient, compatibility_weight_coefficient: of the genetic distance.
@@ -85,38 +82,19 @@ class EvolutionSettings:
     species_elitism: int = 2
 
     def __post_init__(self) -> None:
-        check_choice("evolution.genome", self.genome, tuple(GENOMES))
-        check_flag("evolution.feed_forward", self.feed_forward)
-        check_flag("evolution.positive_start", self.positive_start)
-        check_choice("evolution.activation_default", self.activation_default, ACTIVATIONS)
-        check_choice("evolution.initial_connection", self.initial_connection, INITIAL_CONNECTIONS)
-        for name in ("neat_hidden", "module_hidden", "elitism", "species_elitism"):
-            check_whole(f"evolution.{name}", getattr(self, name), 0, 10_000)
-        for name in ("min_species_size", "max_stagnation"):
-            check_whole(f"evolution.{name}", getattr(self, name), 1)
-        for name in (
-            "weight_init_stdev",
-            "weight_mutate_power",
-            "bias_init_stdev",
-            "bias_mutate_power",
-            "weight_max_value",
-            "bias_max_value",
-            "compatibility_threshold",
-        ):
-            check_real(f"evolution.{name}", getattr(self, name), 0.0)
-        for name in ("compatibility_disjoint_coefficient", "compatibility_weight_coefficient"):
-            check_real(f"evolution.{name}", getattr(self, name), 0.0)
-        for name in (
-            "weight_mutate_rate",
-            "weight_replace_rate",
-            "bias_mutate_rate",
-            "bias_replace_rate",
-            "enabled_mutate_rate",
-            "survival_threshold",
-        ):
-            check_real(f"evolution.{name}", getattr(self, name), 0.0, 1.0)
-        for name in ("conn_add_prob", "conn_delete_prob", "node_add_prob", "node_delete_prob"):
-            check_real(f"evolution.{name}", getattr(self, name), 0.0, 1.0)
+        for field in dataclasses.fields(self):
+            name, value = field.name, getattr(self, field.name)
+            key = f"evolution.{name}"
+            if name in _CHOICES:
+                check_choice(key, value, _CHOICES[name])
+            elif isinstance(field.default, bool):
+                check_flag(key, value)
+            elif name in _AT_LEAST_ONE:
+                check_whole(key, value, 1)
+            elif isinstance(field.default, int):
+                check_whole(key, value, 0, 10_000)
+            else:
+                check_real(key, value, 0.0, 1.0 if name.endswith(_SHARES) else math.inf)
 
 
 RECURRENT = EvolutionSettings(
@@ -146,112 +124,3 @@ RECURRENT = EvolutionSettings(
     species_elitism=1,
 )
 """For the grid worlds: recurrent networks without biases, which keep their signals positive at first."""
-
-
-def neat_config(
-    settings: EvolutionSettings,
-    population: int,
-    shape: tuple[int, int, int],
-    genome_type: type[Any] | None = None,
-) -> neat.Config:
-    """A neat-python configuration of its own for one subpopulation.
-
-    Args:
-        settings: see there.
-        population: genomes per generation.
-        shape: numbers of inputs, initial hidden nodes and outputs.
-        genome_type: the genome's class, if not what the settings say.
-
-    Raises:
-        ExneatError: neat-python reads its configuration from a file only, and none could be written.
-    """
-    genome_type = genome_type or GENOMES[settings.genome]
-    inputs, hidden, outputs = shape
-    sections: dict[str, dict[str, object]] = {
-        "NEAT": {
-            "fitness_criterion": "max",
-            "fitness_threshold": 0,
-            "no_fitness_termination": True,
-            "pop_size": population,
-            "reset_on_extinction": True,
-        },
-        genome_type.__name__: {
-            "num_inputs": inputs,
-            "num_hidden": hidden,
-            "num_outputs": outputs,
-            **_structure(settings),
-            **_number("weight", 0.0, settings.weight_init_stdev, settings.weight_max_value),
-            **_change(
-                "weight", settings.weight_mutate_rate, settings.weight_replace_rate, settings.weight_mutate_power
-            ),
-            **_number("bias", 0.0, settings.bias_init_stdev, settings.bias_max_value),
-            **_change("bias", settings.bias_mutate_rate, settings.bias_replace_rate, settings.bias_mutate_power),
-            **_number("response", 1.0, 0.0, 1.0),
-            **_change("response", 0.0, 0.0, 0.0),
-        },
-        "DefaultSpeciesSet": {"compatibility_threshold": settings.compatibility_threshold},
-        "DefaultStagnation": {
-            "species_fitness_func": "max",
-            "max_stagnation": settings.max_stagnation,
-            "species_elitism": settings.species_elitism,
-        },
-        SteadyReproduction.__name__: {
-            "elitism": settings.elitism,
-            "survival_threshold": settings.survival_threshold,
-            "min_species_size": settings.min_species_size,
-        },
-    }
-    config = _read_config(sections, genome_type)
-    config.genome_config.positive_start = settings.positive_start
-    return config
-
-
-def _structure(settings: EvolutionSettings) -> dict[str, object]:
-    return {
-        "feed_forward": settings.feed_forward,
-        "initial_connection": settings.initial_connection,
-        # neat-python 2.0 takes its default, the string "false", for true.
-        "single_structural_mutation": False,
-        "compatibility_disjoint_coefficient": settings.compatibility_disjoint_coefficient,
-        "compatibility_weight_coefficient": settings.compatibility_weight_coefficient,
-        "conn_add_prob": settings.conn_add_prob,
-        "conn_delete_prob": settings.conn_delete_prob,
-        "node_add_prob": settings.node_add_prob,
-        "node_delete_prob": settings.node_delete_prob,
-        "activation_default": settings.activation_default,
-        "activation_options": settings.activation_default,
-        "activation_mutate_rate": 0.0,
-        "aggregation_default": "sum",
-        "aggregation_options": "sum",
-        "aggregation_mutate_rate": 0.0,
-        "enabled_default": True,
-        "enabled_mutate_rate": settings.enabled_mutate_rate,
-    }
-
-
-def _number(name: str, mean: float, sd: float, bound: float) -> dict[str, object]:
-    return {
-        f"{name}_init_mean": mean,
-        f"{name}_init_stdev": sd,
-        f"{name}_max_value": bound,
-        f"{name}_min_value": -bound,
-    }
-
-
-def _change(name: str, rate: float, replace: float, power: float) -> dict[str, object]:
-    return {f"{name}_mutate_rate": rate, f"{name}_replace_rate": replace, f"{name}_mutate_power": power}
-
-
-def _read_config(sections: dict[str, dict[str, object]], genome_type: type[Any]) -> neat.Config:
-    parser = ConfigParser()
-    parser.read_dict(sections)
-    try:
-        with scratch_directory() as directory:
-            path = directory / "neat.ini"
-            with path.open("w", encoding="utf-8") as file:
-                parser.write(file)
-            kinds = (SteadyReproduction, neat.DefaultSpeciesSet, neat.DefaultStagnation)
-            return neat.Config(genome_type, *kinds, str(path))
-    except OSError as error:
-        why = f"a temporary file of neat-python's configuration could not be written: {error.strerror}"
-        raise ExneatError(f"{why}\n  check the disk, or set TMPDIR to a directory with room") from error

@@ -8,19 +8,10 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.grid.maze_dynamics import GOAL_COLUMN, GOAL_ROW
-from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
-from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
-from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field
-from exneat_cli.tasks.grid.world import COLUMN, MOVES, ROW
+from exneat_cli.tasks import TASKS
+from exneat_cli.tasks.grid.world import COLUMN, MOVES, ROW, GridTask
 from exneat_cli.tasks.task import RUNNING
 
-WORLDS: dict[str, type[TrackMaze] | type[GeneralMaze] | type[Foraging]] = {
-    "exneat/TrackMaze-v0": TrackMaze,
-    "exneat/GeneralMaze-v0": GeneralMaze,
-    "exneat/Foraging-v0": Foraging,
-    "exneat/Hunting-v0": Hunting,
-}
 PIXELS_PER_TILE = 16
 
 
@@ -32,7 +23,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
     world, so episodes terminate and are never truncated.
 
     Args:
-        world: a key of `WORLDS`.
+        task: a grid world's name in `exneat_cli.tasks.TASKS`.
         render_mode: ``rgb_array`` or ``ansi``.
         parameters: of the world's dataclass, e.g. ``size=17``.
 
@@ -45,13 +36,15 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         "render_fps": 4,
     }
 
-    def __init__(self, world: str, render_mode: str | None = None, **parameters: Any) -> None:
-        self.task = WORLDS[world](**parameters)
+    def __init__(self, task: str, render_mode: str | None = None, **parameters: Any) -> None:
+        made = TASKS[task](**parameters)
+        assert isinstance(made, GridTask)
+        self.task = made
         self.render_mode = render_mode
-        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (self.task.observation_size,), np.float64)
+        self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (made.observation_size,), np.float64)
         self.action_space = gymnasium.spaces.Discrete(len(MOVES))
-        self._simulation = self.task.open(training=False)
-        self._observation = np.zeros(self.task.observation_size)
+        self._simulation = made.open(training=False)
+        self._observation = np.zeros(made.observation_size)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -80,28 +73,14 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
         Red is channel 1, blue channel 2, black wall, green the agent (A), yellow the goal or free prey (o).
         """
+        world = self._simulation.world
+        agent = int(world.agent[ROW]), int(world.agent[COLUMN])
         if self.render_mode == "ansi":
-            return _as_text(self._tiles, self._agent, self._targets)
+            return _as_text(self.task.tiles(world), agent, self.task.targets(world))
         if self.render_mode == "rgb_array":
-            return _as_picture(self._tiles, self._agent, self._targets)
+            return _as_picture(self.task.tiles(world), agent, self.task.targets(world))
         gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
         return None
-
-    @property
-    def _tiles(self) -> NDArray[np.float64]:
-        return self.task.tiles(self._simulation.world)
-
-    @property
-    def _agent(self) -> tuple[int, int]:
-        agent = self._simulation.world.grid.agent
-        return int(agent[ROW]), int(agent[COLUMN])
-
-    @property
-    def _targets(self) -> list[tuple[int, int]]:
-        world = self._simulation.world
-        if isinstance(world, Field):
-            return [(int(p[PREY_ROW]), int(p[PREY_COLUMN])) for p in world.prey if p[FREE]]
-        return [(int(world.goal[GOAL_ROW]), int(world.goal[GOAL_COLUMN]))]
 
     def _observe(self) -> NDArray[np.float64]:
         self._simulation.observe(self._simulation.world, self._observation)
@@ -119,6 +98,7 @@ def _as_text(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[t
 def _as_picture(
     tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]
 ) -> NDArray[np.uint8]:
+    # Silent tiles are white; channel 1 takes away green and blue (red stays), channel 2 red and green.
     cues = np.clip(tiles[..., 1:], 0.0, 1.0)
     colours = np.stack([1.0 - cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - cues[..., 0]], axis=2)
     colours[tiles[..., 0] == 0] = 0.0

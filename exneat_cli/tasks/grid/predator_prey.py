@@ -3,8 +3,17 @@
 The agent starts in the centre of an open square with a wall around. Prey emit odour (channel 1) and sound
 (channel 2) in Gaussian patches; in foraging each emits one of them, alternating by index, in hunting both.
 
-Observation and action, index by index: `exneat_cli.tasks.grid.world`. Order of events and scoring:
-`exneat_cli.tasks.grid.prey_dynamics`. Source: Zhang (2025), section 3.2.2, with p_c as the decay of cues.
+Each step begins with the world: the cue field decays; each free prey on the agent's tile is caught; each
+other one may move, is caught if it enters the agent's tile, and adds a patch of cue around itself, or the
+same patch with its values shuffled, which carries no direction. Then the agent senses and moves; stepping
+onto a prey catches it. The episode ends when all are caught, or after `steps` moves. Its fitness, paid at the
+last step, is the share of prey caught.
+
+The reset has drawn all paths and cues (`exneat_cli.tasks.grid.prey_field`), so a step only looks up four tiles;
+a caught prey's cues are taken from the moment before, and fade.
+
+Observation and action, index by index: `exneat_cli.tasks.grid.world`.
+Source: Zhang (2025), section 3.2.2, with p_c as the decay of cues.
 """
 
 from __future__ import annotations
@@ -13,13 +22,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
+from exneat_cli.compiling import compiled, compiled_lean
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
-from exneat_cli.tasks.grid import prey_dynamics
-from exneat_cli.tasks.grid.prey_field import Field, new_field
-from exneat_cli.tasks.grid.world import CHANNELS, GridTask
-from exneat_cli.tasks.task import Simulation
+from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field, bell, draw_prey
+from exneat_cli.tasks.grid.world import CHANNELS, COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, GridTask, move
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 
 MOTIONS = ("levy", "brownian")
 MOST_CUES = 2**25
@@ -52,13 +62,11 @@ class Foraging(GridTask):
     patch_width: int = 5
 
     terms: ClassVar[tuple[str, ...]] = ("caught",)
-    emits_both: ClassVar[bool] = False
+    channels: ClassVar[int] = 1
+    """On which each prey emits."""
 
     def __post_init__(self) -> None:
-        check_choice("task.name", self.name, ["foraging"])
-        self._check_field()
-
-    def _check_field(self) -> None:
+        check_choice("task.name", self.name, ["foraging" if self.channels == 1 else "hunting"])
         check_whole("task.size", self.size, 3, 99)
         check_whole("task.n_prey", self.n_prey, 1, self.size**2 - 1)
         check_whole("task.steps", self.steps, 1, 1_000_000)
@@ -67,11 +75,12 @@ class Foraging(GridTask):
         check_whole("task.patch_width", self.patch_width, 1, 15)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
-        self._check_cues((self.size + 2) ** 2 * (CHANNELS if self.emits_both else 1))
+        self._check_memory()
 
-    def _check_cues(self, per_prey: int) -> None:
-        fix = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
+    def _check_memory(self) -> None:
+        per_prey = (self.size + 2) ** 2 * self.channels
         most_prey, most_steps = MOST_CUES // per_prey, MOST_CUES // (per_prey * self.n_prey)
+        fix = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
         if self.n_prey > most_prey:
             raise ConfigError("task.n_prey", f"at most {most_prey} for this size", self.n_prey, fix)
         if self.steps > most_steps:
@@ -88,28 +97,41 @@ class Foraging(GridTask):
         """`steps`."""
         return self.steps
 
-    def tiles(self, world: Field) -> NDArray[np.float64]:
-        """(N, N, 3) path (1 or 0) and both channels of the cue field as the agent sensed it last."""
-        signals = np.zeros_like(world.grid.signals)
-        prey_dynamics.paint(world, signals)
-        return np.stack([world.grid.path, *signals], axis=2)
-
     def open(self, *, training: bool) -> Simulation:
         """Open a new field."""
-        return _simulation(self._field(motion=0.0, levy=False))
+        return self._open(motion=0.0, levy=False)
 
-    def _field(self, *, motion: float, levy: bool) -> Field:
-        return new_field(
-            self.size,
-            self.n_prey,
-            self.patch_width,
-            emission=self.p_e,
-            decay=self.p_c,
-            motion=motion,
+    def _open(self, *, motion: float, levy: bool) -> Simulation:
+        tiles, prey = (self.size + 2, self.size + 2), self.n_prey
+        field = Field(
+            path=np.zeros(tiles, np.int64),
+            agent=np.zeros(3, np.int64),
+            prey=np.zeros((prey, 3), np.int64),
+            start=np.zeros((prey, 2), np.int64),
+            places=np.zeros((self.steps, prey, 2), np.int64),
+            cues=np.zeros((self.steps, *tiles, prey * self.channels)),
+            last_free=np.zeros(prey, np.int64),
+            strength=np.zeros(prey),
+            patch=bell(self.patch_width),
+            channels=self.channels,
+            emission=float(self.p_e),
+            keep=1.0 - self.p_c,
+            motion=float(motion),
             levy=levy,
-            both_channels=self.emits_both,
-            max_steps=self.steps,
         )
+        return Simulation(field, reset, rewind, observe, step, locate)
+
+    def tiles(self, world: Field) -> NDArray[np.float64]:
+        """(N, N, 3) path (1 or 0) and both channels of the cue field as the agent sensed it last."""
+        tiles = np.stack([world.path, *np.zeros((CHANNELS, *world.path.shape))], axis=2)
+        for emitter in range(world.cues.shape[3]):
+            k = emitter // self.channels
+            tiles[..., 1 + emitter % CHANNELS] += world.strength[k] * world.cues[world.last_free[k], ..., emitter]
+        return tiles
+
+    def targets(self, world: Field) -> list[tuple[int, int]]:
+        """The prey that are free."""
+        return [(int(row), int(column)) for row, column, free in world.prey if free]
 
 
 @dataclass(frozen=True)
@@ -117,6 +139,7 @@ class Hunting(Foraging):
     """Parameters of hunting: those of foraging, and how prey move.
 
     Attributes:
+        name: always ``hunting``.
         p_m: chance that a free prey moves in a step, 0 to 1.
         motion: ``levy`` (straight flights of 1 to 7 tiles) or ``brownian`` (a new direction each time).
 
@@ -128,19 +151,104 @@ class Hunting(Foraging):
     p_m: float = 0.5
     motion: str = "levy"
 
-    emits_both: ClassVar[bool] = True
+    channels: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        check_choice("task.name", self.name, ["hunting"])
-        self._check_field()
+        super().__post_init__()
         check_real("task.p_m", self.p_m, 0.0, 1.0)
         check_choice("task.motion", self.motion, MOTIONS)
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new field."""
-        return _simulation(self._field(motion=self.p_m, levy=self.motion == "levy"))
+        return self._open(motion=self.p_m, levy=self.motion == "levy")
 
 
-def _simulation(field: Field) -> Simulation:
-    functions = (prey_dynamics.reset, prey_dynamics.rewind, prey_dynamics.observe, prey_dynamics.step)
-    return Simulation(field, *functions, prey_dynamics.locate)
+@compiled
+def reset(field: Field, rng: Generator) -> None:
+    """Draw prey, their ways and their cues, and start."""
+    draw_prey(field, rng)
+    rewind(field)
+
+
+@compiled_lean
+def rewind(field: Field) -> None:
+    """Put the agent into the centre and set all prey free, where they were."""
+    agent, prey = field.agent, field.prey
+    agent[ROW] = agent[COLUMN] = field.path.shape[0] // 2
+    agent[STEPS] = 0
+    for k in range(prey.shape[0]):
+        prey[k, PREY_ROW], prey[k, PREY_COLUMN], prey[k, FREE] = field.start[k, 0], field.start[k, 1], 1
+        field.strength[k] = 1.0
+    advance(field)
+
+
+@compiled_lean
+def advance(field: Field) -> int:
+    """Bring prey and cues to what the agent senses next; returns how many prey are free then."""
+    agent, prey, strength, last_free = field.agent, field.prey, field.strength, field.last_free
+    t = agent[STEPS]
+    free = 0
+    for k in range(prey.shape[0]):
+        if prey[k, FREE] == 1:
+            # A free prey goes where the reset had it go, and stays free unless it meets the agent there.
+            row, column = field.places[t, k, 0], field.places[t, k, 1]
+            prey[k, PREY_ROW], prey[k, PREY_COLUMN] = row, column
+            if row != agent[ROW] or column != agent[COLUMN]:
+                last_free[k] = t
+                free += 1
+                continue
+            # Caught: it emits no more, so its cues of the step before fade; before the first step there are none.
+            prey[k, FREE] = 0
+            if t == 0:
+                last_free[k] = 0
+                strength[k] = 0.0
+        strength[k] *= field.keep
+    return free
+
+
+@compiled_lean
+def observe(field: Field, observation: NDArray[np.float64]) -> None:
+    """Write the cue field on the four neighbours: per channel the sum over emitters."""
+    agent, cues = field.agent, field.cues
+    last_free, strength = field.last_free, field.strength
+    row, column = agent[ROW], agent[COLUMN]
+    observation[:] = 0.0
+    for k in range(last_free.size):
+        t, share = last_free[k], strength[k]
+        for emitter in range(k * field.channels, (k + 1) * field.channels):
+            channel = emitter % CHANNELS
+            for side in range(4):
+                cue = cues[t, row + ROW_STEPS[side], column + COLUMN_STEPS[side], emitter]
+                observation[CHANNELS * side + channel] += share * cue
+
+
+@compiled_lean
+def step(field: Field, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
+    """Move once, and let the world do what comes before the next move; `terms`, (1,), become the share caught."""
+    prey, agent = field.prey, field.agent
+    terms[:] = 0.0
+    if not move(field.path, agent, action):
+        return FAILED
+    # Stepping onto a prey catches it.
+    free = 0
+    for k in range(prey.shape[0]):
+        if prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
+            prey[k, FREE] = 0
+        free += prey[k, FREE]
+    # Prey may run into the agent, which ends the episode too if they were the last.
+    if agent[STEPS] < field.cues.shape[0] and free > 0:
+        free = advance(field)
+        if free > 0:
+            return RUNNING
+    terms[0] = 1.0 - free / prey.shape[0]
+    return ENDED
+
+
+@compiled
+def locate(field: Field, row: NDArray[np.float64]) -> None:
+    """Write the agent's row and column, then row, column and freedom of every prey."""
+    row[0] = field.agent[ROW]
+    row[1] = field.agent[COLUMN]
+    for k in range(field.prey.shape[0]):
+        for entry in range(3):
+            row[2 + 3 * k + entry] = field.prey[k, entry]

@@ -1,8 +1,8 @@
 """The open field: its storage, and all that chance does in it, drawn at the reset.
 
-Prey do not heed the agent. So a reset draws all paths and cues up to the last step, each emitter's apart
+Prey take no notice of the agent. So a reset draws all paths and cues up to the last step, each emitter's apart
 (an emitter is a prey on one channel). What the agent makes of them, and the order of events:
-`exneat_cli.tasks.grid.prey_dynamics`.
+`exneat_cli.tasks.grid.predator_prey`.
 
 Source: Zhang (2025), section 3.2.2.
 """
@@ -16,156 +16,91 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
-from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, Grid, empty_grid
+from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS
 
 LONGEST_FLIGHT = 7
-FLIGHT_EXPONENT = -2.0
-"""Flight lengths 1 to LONGEST_FLIGHT have probability proportional to length ** FLIGHT_EXPONENT."""
+FLIGHT_CHANCE = np.cumsum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0) / np.sum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0)
+"""Cumulative probability of flights of 1 to LONGEST_FLIGHT tiles: a length's own is proportional to length ** -2."""
 PATCH_SD = 1.0
-"""Tiles."""
+"""Width of the bell of an emission, in tiles."""
 DRAWS_PER_NUMBER = 4
 """Choices of a shuffle that share one uniform number; each of up to 225 uses at most 8 of its 53 bits."""
 PREY_ROW, PREY_COLUMN, FREE = range(3)
 """Columns of `Field.prey`: where it is, or was when it was caught, and whether it is free."""
 WALK_ROW, WALK_COLUMN, DIRECTION, FLIGHT = range(4)
-"""Columns of `Field.walkers`: where a prey is, its direction and the steps left of its flight."""
+"""Columns of `walkers`, (n_prey, 4): where a prey is on its way, its direction, and the steps left of its flight."""
 
 
 class Field(NamedTuple):
-    """An open field with prey.
+    """An open field of N x N tiles, the wall included, with prey.
 
-    T is the number of times that the agent senses, E that of emitters: prey on channel 1, then on channel 2.
-
-    Attributes:
-        grid: tiles and agent; its signals are not used here.
-        prey: (n_prey, 3) as the agent left them, see `PREY_ROW`.
-        start: (n_prey, 2) where they are before the first step.
-        places: (T, n_prey, 2) where each one is when the agent senses, unless it was caught.
-        cues: (T, N, N, E) what each emitter adds to each tile when the agent senses.
-        emitters: (E,) the prey behind each emitter.
-        first_of_second: how many emitters are on channel 1.
-        last_free: (n_prey,) when its emitters were last heard; now, for a free one.
-        strength: (n_prey,) what is left of its cues since then.
-        walkers: (n_prey, 4) scratch, see `WALK_ROW`.
-        width: tiles per side of an emission.
-        patch: (width * width,) cue that an emission adds, 1 at its centre.
-        shuffled: (width * width,) the same values in another order each time.
-        flight_chance: (LONGEST_FLIGHT,) cumulative probability of flight lengths.
-        scratch: (tiles, 2).
-        emission: chance per prey, step and channel that the patch has a direction.
-        keep: share of the field that is left after a step.
-        motion: chance that a prey moves in a step; 0 where prey never move.
-        levy: straight flights, else a new direction for each move.
+    T is the number of times that the agent senses, E that of emitters: emitter e is prey ``e // channels``, and is
+    heard on channel ``e % 2``. So prey on one channel alternate, and prey on both have two emitters.
     """
 
-    grid: Grid
-    prey: NDArray[np.int64]
-    start: NDArray[np.int64]
-    places: NDArray[np.int64]
-    cues: NDArray[np.float64]
-    emitters: NDArray[np.int64]
-    first_of_second: int
-    last_free: NDArray[np.int64]
-    strength: NDArray[np.float64]
-    walkers: NDArray[np.int64]
-    width: int
-    patch: NDArray[np.float64]
-    shuffled: NDArray[np.float64]
-    flight_chance: NDArray[np.float64]
-    scratch: NDArray[np.int64]
-    emission: float
-    keep: float
-    motion: float
-    levy: bool
+    path: NDArray[np.int64]  #: (N, N), see `exneat_cli.tasks.grid.world.GridTask`
+    agent: NDArray[np.int64]  #: (3,), see there
+    prey: NDArray[np.int64]  #: (n_prey, 3) as the agent left them, see `PREY_ROW`
+    start: NDArray[np.int64]  #: (n_prey, 2) where they are before the first step
+    places: NDArray[np.int64]  #: (T, n_prey, 2) where each one is when the agent senses, unless it was caught
+    cues: NDArray[np.float64]  #: (T, N, N, E) what each emitter adds to each tile when the agent senses
+    last_free: NDArray[np.int64]  #: (n_prey,) the time of the cues by which a prey is sensed: now, if it is free
+    strength: NDArray[np.float64]  #: (n_prey,) what is left of these cues
+    patch: NDArray[np.float64]  #: (width, width) cue that an emission adds, 1 at its centre
+    channels: int  #: on which each prey emits, 1 or 2
+    emission: float  #: chance per prey, step and channel that the patch has a direction
+    keep: float  #: share of the field that is left after a step
+    motion: float  #: chance that a prey moves in a step; 0 where prey never move
+    levy: bool  #: straight flights, else a new direction for each move
 
 
-def new_field(
-    size: int,
-    n_prey: int,
-    patch_width: int,
-    *,
-    emission: float,
-    decay: float,
-    motion: float,
-    levy: bool,
-    both_channels: bool,
-    max_steps: int,
-) -> Field:
-    """Storage for an open square of size x size tiles with a wall around.
-
-    Args:
-        size: open tiles per side.
-        n_prey: number of prey.
-        patch_width: tiles per side of an emission.
-        emission: chance per prey, step and channel that the patch has a direction.
-        decay: share of the field that fades at each step.
-        motion: chance that a prey moves in a step.
-        levy: straight flights, else a new direction for each move.
-        both_channels: every prey emits on both channels, else they alternate by index.
-        max_steps: moves of the agent.
-    """
-    offsets = np.arange(patch_width) - patch_width // 2
-    profile = np.exp(-0.5 * (offsets / PATCH_SD) ** 2)
-    lengths = np.arange(1, LONGEST_FLIGHT + 1) ** FLIGHT_EXPONENT
-    prey = np.arange(n_prey)
-    channels = [prey, prey] if both_channels else [prey[::2], prey[1::2]]
-    emitters = np.concatenate(channels)
-    return Field(
-        grid=empty_grid(size + 2),
-        prey=np.zeros((n_prey, 3), np.int64),
-        start=np.zeros((n_prey, 2), np.int64),
-        places=np.zeros((max_steps, n_prey, 2), np.int64),
-        cues=np.zeros((max_steps, size + 2, size + 2, len(emitters))),
-        emitters=emitters,
-        first_of_second=len(channels[0]),
-        last_free=np.zeros(n_prey, np.int64),
-        strength=np.zeros(n_prey),
-        walkers=np.zeros((n_prey, 4), np.int64),
-        width=patch_width,
-        patch=np.outer(profile, profile).ravel(),
-        shuffled=np.outer(profile, profile).ravel(),
-        flight_chance=np.cumsum(lengths) / np.sum(lengths),
-        scratch=np.zeros((size * size, 2), np.int64),
-        emission=float(emission),
-        keep=1.0 - decay,
-        motion=float(motion),
-        levy=levy,
-    )
+def bell(width: int) -> NDArray[np.float64]:
+    """The patch of an emission, (width, width)."""
+    profile = np.exp(-0.5 * ((np.arange(width) - width // 2) / PATCH_SD) ** 2)
+    return np.outer(profile, profile)
 
 
 @compiled
 def draw_prey(field: Field, rng: Generator) -> None:
     """Put prey on distinct tiles but the centre, and draw where they go and what they emit at every step."""
-    path = field.grid.path
-    path[:] = 0
-    path[1:-1, 1:-1] = 1
-    _place_prey(field.start, field.scratch, path.shape[0], rng)
-    field.walkers[:] = 0
-    field.walkers[:, :2] = field.start
-    field.shuffled[:] = field.patch
+    field.path[:] = 0
+    field.path[1:-1, 1:-1] = 1
+    draw_starts(field.start, field.path.shape[0], rng)
+    walkers = np.zeros((field.start.shape[0], 4), np.int64)
+    walkers[:, :2] = field.start
+    shuffled = field.patch.copy()
     for t in range(field.cues.shape[0]):
-        _advance_prey(field, t, rng)
+        draw_moment(field, t, walkers, shuffled, rng)
 
 
 @compiled
-def _place_prey(start, scratch, size, rng):  # type: ignore[no-untyped-def]
-    centre, count = size // 2, 0
+def draw_starts(start: NDArray[np.int64], size: int, rng: Generator) -> None:
+    """Draw `start`, (n_prey, 2), from all open tiles but the centre, where the agent starts."""
+    tiles, count = np.empty((size * size, 2), np.int64), 0
     for row in range(1, size - 1):
         for column in range(1, size - 1):
-            if row != centre or column != centre:
-                scratch[count, 0], scratch[count, 1] = row, column
+            if row != size // 2 or column != size // 2:
+                tiles[count, 0], tiles[count, 1] = row, column
                 count += 1
+    # The first steps of a Fisher-Yates shuffle.
     for k in range(start.shape[0]):
         chosen = k + int(rng.integers(0, count - k))
         for axis in range(2):
-            start[k, axis] = scratch[chosen, axis]
-            scratch[chosen, axis] = scratch[k, axis]
+            start[k, axis] = tiles[chosen, axis]
+            tiles[chosen, axis] = tiles[k, axis]
 
 
 @compiled
-def _advance_prey(field, t, rng):  # type: ignore[no-untyped-def]
+def draw_moment(
+    field: Field, t: int, walkers: NDArray[np.int64], shuffled: NDArray[np.float64], rng: Generator
+) -> None:
+    """Draw where each prey goes and what it emits before the agent senses for the t-th time.
+
+    `walkers` and `shuffled`, (width, width) with the values of the patch, go on from where the last moment left them.
+    """
     # Arrays are taken out of the tuple once: passing the tuple on costs more than what the callees do.
-    walkers, path, cues = field.walkers, field.grid.path, field.cues
+    path, cues = field.path, field.cues
+    # The field decays: one flat loop, which the compiler turns into vector instructions.
     now = cues[t].reshape(cues[t].size)
     if t == 0:
         now[:] = 0.0
@@ -174,36 +109,30 @@ def _advance_prey(field, t, rng):  # type: ignore[no-untyped-def]
         for i in range(now.size):
             now[i] = field.keep * before[i]
     for k in range(walkers.shape[0]):
+        # A prey moves, or stays. Worlds without motion draw nothing for it.
         if field.motion > 0.0 and rng.random() < field.motion:
-            move_prey(walkers, k, path, field.flight_chance, field.levy, rng)
+            move_prey(walkers, k, path, field.levy, rng)
         row, column = walkers[k, WALK_ROW], walkers[k, WALK_COLUMN]
         field.places[t, k, 0], field.places[t, k, 1] = row, column
-        for emitter in range(field.emitters.size):
-            if field.emitters[emitter] != k:
-                continue
+        # It emits on each of its channels, with a direction or without.
+        for emitter in range(k * field.channels, (k + 1) * field.channels):
             if rng.random() < field.emission:
-                _add(cues[t], emitter, row, column, field.patch, field.width)
+                add_patch(cues[t], emitter, row, column, field.patch)
             else:
-                _shuffle(field.shuffled, rng)
-                _add(cues[t], emitter, row, column, field.shuffled, field.width)
+                shuffle(shuffled.reshape(shuffled.size), rng)
+                add_patch(cues[t], emitter, row, column, shuffled)
 
 
 @compiled
-def move_prey(
-    walkers: NDArray[np.int64],
-    k: int,
-    path: NDArray[np.int64],
-    flight_chance: NDArray[np.float64],
-    levy: bool,
-    rng: Generator,
-) -> None:
+def move_prey(walkers: NDArray[np.int64], k: int, path: NDArray[np.int64], levy: bool, rng: Generator) -> None:
     """Move prey `k` by one tile: straight on in its flight, or in a new direction; walls end a flight."""
+    # A new flight: one of four directions, and the first length whose cumulative probability reaches the number drawn.
     if walkers[k, FLIGHT] == 0:
         walkers[k, DIRECTION] = int(4 * rng.random())
         walkers[k, FLIGHT] = 1
         if levy:
             draw = rng.random()
-            while flight_chance[walkers[k, FLIGHT] - 1] < draw:
+            while FLIGHT_CHANCE[walkers[k, FLIGHT] - 1] < draw:
                 walkers[k, FLIGHT] += 1
     side = walkers[k, DIRECTION]
     row, column = walkers[k, WALK_ROW] + ROW_STEPS[side], walkers[k, WALK_COLUMN] + COLUMN_STEPS[side]
@@ -215,18 +144,19 @@ def move_prey(
 
 
 @compiled
-def _add(tiles, emitter, row, column, cues, width):  # type: ignore[no-untyped-def]
+def add_patch(tiles: NDArray[np.float64], emitter: int, row: int, column: int, patch: NDArray[np.float64]) -> None:
+    """Add `patch`, (width, width), around (row, column) to an emitter's `tiles`, (N, N, E), but not to walls."""
+    width, last = patch.shape[0], tiles.shape[0] - 2
     top, left = row - width // 2, column - width // 2
-    last = tiles.shape[0] - 2
     first_column, last_column = max(left, 1), min(left + width - 1, last)
     for r in range(max(top, 1), min(top + width - 1, last) + 1):
-        offset = (r - top) * width - left
         for c in range(first_column, last_column + 1):
-            tiles[r, c, emitter] += cues[offset + c]
+            tiles[r, c, emitter] += patch[r - top, c - left]
 
 
 @compiled
-def _shuffle(values, rng):  # type: ignore[no-untyped-def]
+def shuffle(values: NDArray[np.float64], rng: Generator) -> None:
+    """Bring `values` into any order with equal chance, in place."""
     # Shuffling what was shuffled before is as fair as starting from order. A uniform number has bits for
     # several choices; DRAWS_PER_NUMBER of them leave at least 21 bits of fairness for the last.
     left_in_number = 0
@@ -235,6 +165,7 @@ def _shuffle(values, rng):  # type: ignore[no-untyped-def]
         if left_in_number == 0:
             number = rng.random()
             left_in_number = DRAWS_PER_NUMBER
+        # The whole part is a choice from 0 to i, the rest is uniform again.
         number *= i + 1
         j = int(number)
         number -= j

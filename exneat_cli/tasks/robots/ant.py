@@ -30,7 +30,7 @@ contact forces.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from typing import ClassVar
 
@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.errors import check_choice, check_real, check_whole
 from exneat_cli.tasks.robots import dynamics, mujoco_library
-from exneat_cli.tasks.robots.parts import FORCES_PER_BODY, SKIPPED_POSITIONS, Limb, find_limbs
+from exneat_cli.tasks.robots.parts import FORCES_PER_BODY, SKIPPED_POSITIONS, find_parts
 from exneat_cli.tasks.task import Part, Simulation, Task
 
 CONTROL_WEIGHTS = {"thesis": 0.01, "gymnasium": 0.5}
@@ -52,8 +52,11 @@ HEALTHY_REWARD = 1.0
 HEALTHY_HEIGHTS = (0.2, 1.0)
 """Metres; outside of them an episode ends. Gymnasium's Ant-v5."""
 FORCE_LIMIT = 1.0
+"""Contact forces (N) and torques (N m) are clipped to this, for sensors and cost alike. Gymnasium's Ant-v5."""
 SUBSTEPS = 5
+"""Physics steps of 0.01 s per control step."""
 TRUNK_BODY = 1
+"""Body 0 is the world."""
 RESET_SCALE = 0.1
 """Noise on the initial pose, the default of Gymnasium's Ant-v5."""
 ORDER_BY_POSITION = ("front_left", "front_right", "back_left", "back_right")
@@ -101,17 +104,16 @@ class AntTask(Task):
     @property
     def parts(self) -> tuple[Part, ...]:
         """The four legs; each senses 22 numbers and moves a hip and an ankle."""
-        _, limbs = _limbs()
-        legs = [Part(_quadrant(limb), limb.sensors, limb.actuators, limb.position) for limb in limbs]
+        _, legs = _trunk_and_legs()
         if self.part_order == "position":
-            legs.sort(key=lambda leg: ORDER_BY_POSITION.index(leg.name))
+            return tuple(sorted(legs, key=lambda leg: ORDER_BY_POSITION.index(leg.name)))
         return tuple(legs)
 
     @property
     def trunk(self) -> Part:  # type: ignore[override]
         """The trunk's 17 sensors; it has no actuators of its own."""
-        trunk, _ = _limbs()
-        return Part("trunk", trunk.sensors, trunk.actuators, trunk.position)
+        trunk, _ = _trunk_and_legs()
+        return replace(trunk, name="trunk")
 
     @property
     def observation_size(self) -> int:
@@ -199,10 +201,11 @@ def _model() -> mujoco.MjModel:
 
 
 @functools.cache
-def _limbs() -> tuple[Limb, list[Limb]]:
-    return find_limbs(_model())
+def _trunk_and_legs() -> tuple[Part, list[Part]]:
+    """The legs by the names of where they stand, which are not those of the model's bodies."""
+    trunk, legs = find_parts(_model())
+    return trunk, [replace(leg, name=_quadrant(*leg.position)) for leg in legs]
 
 
-def _quadrant(limb: Limb) -> str:
-    x, y = limb.position
+def _quadrant(x: float, y: float) -> str:
     return f"{'front' if x > 0 else 'back'}_{'left' if y > 0 else 'right'}"

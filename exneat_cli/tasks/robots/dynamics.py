@@ -21,58 +21,41 @@ STEPS, STUCK_STEPS, WARNINGS = range(3)
 
 
 class AntWorld(NamedTuple):
-    """MuJoCo's memory as NumPy views, and the rules of an episode.
+    """MuJoCo's memory as NumPy views, and the rules of an episode."""
 
-    Attributes:
-        model, data: addresses of the C structures.
-        qpos, qvel, ctrl, xpos, cfrc_ext: views of `mjData`; shapes (nq,), (nv,), (nu,), (nbody, 3), (nbody, 6).
-        warnings: view of MuJoCo's warning counters.
-        initial_qpos, initial_qvel: the pose that a reset perturbs.
-        start_qpos, start_qvel: what it made of it.
-        trunk: body whose height and x position count.
-        substeps, control_period: physics steps per control step, and its length in seconds.
-        reset_scale: half-width of the uniform noise on positions (rad, m), sd of that on velocities.
-        lowest, highest: healthy heights of the trunk in metres.
-        force_limit: contact forces are clipped to [-force_limit, force_limit].
-        healthy_reward, control_weight, contact_weight: weights of the reward terms.
-        max_steps: control steps after which an episode ends.
-        progress, patience: an episode ends after `patience` steps (0: never) without `progress` metres.
-        clock: see `STEPS`, `STUCK_STEPS` and `WARNINGS`.
-        mark: x position (m) that progress is measured from, in an array of one.
-    """
-
-    model: int
-    data: int
-    qpos: NDArray[np.float64]
-    qvel: NDArray[np.float64]
-    ctrl: NDArray[np.float64]
-    xpos: NDArray[np.float64]
-    cfrc_ext: NDArray[np.float64]
-    warnings: NDArray[np.int32]
-    initial_qpos: NDArray[np.float64]
+    model: int  #: address of the C structure `mjModel`
+    data: int  #: address of `mjData`, of which the next six are views
+    qpos: NDArray[np.float64]  #: (nq,), m, rad and quaternions
+    qvel: NDArray[np.float64]  #: (nv,), m/s and rad/s
+    ctrl: NDArray[np.float64]  #: (nu,)
+    xpos: NDArray[np.float64]  #: (nbody, 3), m
+    cfrc_ext: NDArray[np.float64]  #: (nbody, 6), N m and N
+    warnings: NDArray[np.int32]  #: counters
+    initial_qpos: NDArray[np.float64]  #: the pose that a reset disturbs
     initial_qvel: NDArray[np.float64]
-    start_qpos: NDArray[np.float64]
+    start_qpos: NDArray[np.float64]  #: what the reset made of it
     start_qvel: NDArray[np.float64]
-    trunk: int
-    substeps: int
-    control_period: float
-    reset_scale: float
-    lowest: float
+    trunk: int  #: body whose height and x position count
+    substeps: int  #: physics steps per control step
+    control_period: float  #: seconds per control step
+    reset_scale: float  #: half-width of the uniform noise on positions (rad, m), sd of that on velocities
+    lowest: float  #: healthy height of the trunk in m
     highest: float
-    force_limit: float
-    healthy_reward: float
+    force_limit: float  #: contact forces are clipped to [-force_limit, force_limit]
+    healthy_reward: float  #: weights of the reward terms
     control_weight: float
     contact_weight: float
-    max_steps: int
-    progress: float
-    patience: int
-    clock: NDArray[np.int64]
-    mark: NDArray[np.float64]
+    max_steps: int  #: control steps after which an episode ends
+    progress: float  #: m without which an episode ends after `patience` steps
+    patience: int  #: 0: never
+    clock: NDArray[np.int64]  #: (3,), see `STEPS`, `STUCK_STEPS` and `WARNINGS`
+    mark: NDArray[np.float64]  #: (1,), x in m that progress is measured from
 
 
 @compiled
 def reset(world: AntWorld, rng: Generator) -> None:
     """Put the body near its initial pose, as Gymnasium's Ant does with the same generator."""
+    # Uniform noise on all positions, then normal noise on all velocities.
     for i in range(world.qpos.size):
         world.start_qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
     for i in range(world.qvel.size):
@@ -83,22 +66,24 @@ def reset(world: AntWorld, rng: Generator) -> None:
 @compiled
 def rewind(world: AntWorld) -> None:
     """Put the body back to where the last reset had put it."""
+    # MuJoCo forgets all that the episode left behind.
     mj_resetData(world.model, world.data)
     world.clock[STEPS] = 0
     world.clock[STUCK_STEPS] = 0
     world.clock[WARNINGS] = np.sum(world.warnings)
-    # Assigning slices would do the same, and take seconds to compile.
+    # Assigning slices would do the same, and take seconds to compile; so loops are written out, here and below.
     for i in range(world.qpos.size):
         world.qpos[i] = world.start_qpos[i]
     for i in range(world.qvel.size):
         world.qvel[i] = world.start_qvel[i]
+    # No step is taken, so the first contact forces are 0, as in Gymnasium.
     mj_forward(world.model, world.data)
     world.mark[0] = world.xpos[world.trunk, 0]
 
 
 @compiled
 def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
-    """Write positions without x and y, velocities, and clipped contact forces."""
+    """Write positions without the trunk's x and y, velocities, and the clipped contact forces of all bodies."""
     k = 0
     for i in range(2, world.qpos.size):
         observation[k] = world.qpos[i]
@@ -106,7 +91,7 @@ def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
     for i in range(world.qvel.size):
         observation[k] = world.qvel[i]
         k += 1
-    for body in range(1, world.cfrc_ext.shape[0]):
+    for body in range(1, world.cfrc_ext.shape[0]):  # 0 is the world
         for i in range(world.cfrc_ext.shape[1]):
             observation[k] = min(max(world.cfrc_ext[body, i], -world.force_limit), world.force_limit)
             k += 1
@@ -114,7 +99,7 @@ def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
 
 @compiled
 def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
-    """One control step; `terms` become forward, healthy, control and contact reward of this step."""
+    """Do one control step; `terms`, (4,), become its forward, healthy, control and contact reward."""
     for i in range(action.size):
         if not np.isfinite(action[i]):
             return FAILED
@@ -122,11 +107,14 @@ def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64
     before = world.xpos[world.trunk, 0]
     for _ in range(world.substeps):
         mj_step(world.model, world.data)
+    # mj_step leaves the contact forces of bodies uncomputed.
     mj_rnePostConstraint(world.model, world.data)
+    # An exploding body makes MuJoCo warn and reset itself, and would go on earning the healthy reward.
     if np.sum(world.warnings) != world.clock[WARNINGS]:
         return FAILED
     if not (np.isfinite(world.qpos).all() and np.isfinite(world.qvel).all()):
         return FAILED
+    # The episode ends with a fall or a jump, in time, or when training sees no progress.
     height = world.qpos[2]
     healthy = world.lowest <= height and height <= world.highest
     _reward(world, action, before, healthy, terms)
@@ -138,12 +126,14 @@ def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64
 
 @compiled
 def _reward(world, action, before, healthy, terms):  # type: ignore[no-untyped-def]
+    # The trunk's velocity along x in m/s. After RK4 steps xpos lags behind qpos; Gymnasium takes xpos.
     terms[0] = (world.xpos[world.trunk, 0] - before) / world.control_period
     terms[1] = world.healthy_reward if healthy else 0.0
     effort = 0.0
     for i in range(action.size):
         effort += action[i] * action[i]
     terms[2] = -world.control_weight * effort
+    # The world's own entries are part of the sum, as in Gymnasium.
     squared = 0.0
     for body in range(world.cfrc_ext.shape[0]):
         for i in range(world.cfrc_ext.shape[1]):
@@ -154,6 +144,7 @@ def _reward(world, action, before, healthy, terms):  # type: ignore[no-untyped-d
 
 @compiled
 def _stuck(world):  # type: ignore[no-untyped-def]
+    # The mark moves along with every bit of progress, and the count starts again.
     x = world.xpos[world.trunk, 0]
     if x >= world.mark[0] + world.progress:
         world.mark[0] = x

@@ -17,23 +17,12 @@ from numba import types
 
 from exneat_cli.errors import ExneatError
 
-_ON_MODEL_AND_DATA = types.void(types.int64, types.int64)
-
-mj_step: Any = types.ExternalFunction("mj_step", _ON_MODEL_AND_DATA)
-mj_forward: Any = types.ExternalFunction("mj_forward", _ON_MODEL_AND_DATA)
-mj_resetData: Any = types.ExternalFunction("mj_resetData", _ON_MODEL_AND_DATA)
-mj_rnePostConstraint: Any = types.ExternalFunction("mj_rnePostConstraint", _ON_MODEL_AND_DATA)
-
 _SYMBOLS = ("mj_step", "mj_forward", "mj_resetData", "mj_rnePostConstraint")
 _LIBRARY_PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 
-
-def find_library(directory: Path) -> Path | None:
-    """MuJoCo's shared library in the bindings' directory, or None."""
-    for pattern in _LIBRARY_PATTERNS:
-        for path in sorted(directory.glob(pattern)):
-            return path
-    return None
+# Each takes the addresses of an mjModel and an mjData.
+_functions: list[Any] = [types.ExternalFunction(name, types.void(types.int64, types.int64)) for name in _SYMBOLS]
+mj_step, mj_forward, mj_resetData, mj_rnePostConstraint = _functions
 
 
 @functools.cache
@@ -44,17 +33,18 @@ def load_library() -> None:
         ExneatError: its library is not beside its Python bindings, cannot be loaded or lacks a function.
     """
     directory = Path(mujoco.__file__).parent
-    library = find_library(directory)
+    libraries = [path for pattern in _LIBRARY_PATTERNS for path in sorted(directory.glob(pattern))]
     fix = "install MuJoCo from its wheel, which holds its library: pip install --force-reinstall mujoco"
-    if library is None:
+    if not libraries:
         raise ExneatError(f"MuJoCo: expected its library in {directory}, got none\n  {fix}")
     try:
-        llvmlite.binding.load_library_permanently(str(library))
+        llvmlite.binding.load_library_permanently(str(libraries[0]))
     except RuntimeError as error:
-        raise ExneatError(f"MuJoCo: {library.name} could not be loaded: {error}\n  {fix}") from error
+        raise ExneatError(f"MuJoCo: {libraries[0].name} could not be loaded: {error}\n  {fix}") from error
+    # Compiled code that calls what is not there would take the process down.
     missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
     if missing:
-        raise ExneatError(f"MuJoCo: {library.name} has no {', '.join(missing)}\n  {fix}")
+        raise ExneatError(f"MuJoCo: {libraries[0].name} has no {', '.join(missing)}\n  {fix}")
 
 
 @functools.cache

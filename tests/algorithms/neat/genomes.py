@@ -10,15 +10,17 @@ from typing import Any
 
 import neat
 import numpy as np
-from neat.innovation import InnovationTracker
+from numpy.random import PCG64, Generator
 from scipy.stats import chi2_contingency, ks_2samp
 
-from exneat_cli.algorithms import ArrayGenome, EvolutionSettings, neat_config
+from exneat_cli.algorithms import RECURRENT, ArrayGenome, EvolutionSettings, neat_config
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
+from exneat_cli.algorithms.neat.neat_python import machinery
 
 ALPHA = 1e-4
 """Seeds are fixed, so a test that holds once holds always."""
 
+COLUMNS = {"feed-forward": EvolutionSettings(), "recurrent": RECURRENT}
 NO_STRUCTURE = {"conn_add_prob": 0.0, "conn_delete_prob": 0.0, "node_add_prob": 0.0, "node_delete_prob": 0.0}
 NO_ATTRIBUTES = {
     "weight_mutate_rate": 0.0,
@@ -29,36 +31,24 @@ NO_ATTRIBUTES = {
 }
 
 
-def lively(settings: EvolutionSettings) -> EvolutionSettings:
+def lively(settings: EvolutionSettings, **changes: Any) -> EvolutionSettings:
     """The same with much structural mutation and many flags drawn anew."""
-    return replace(
-        settings,
-        conn_add_prob=0.8,
-        conn_delete_prob=0.3,
-        node_add_prob=0.5,
-        node_delete_prob=0.3,
-        enabled_mutate_rate=0.3,
-    )
+    often = {"conn_add_prob": 0.8, "conn_delete_prob": 0.3, "node_add_prob": 0.5, "node_delete_prob": 0.3}
+    return replace(settings, **{**often, "enabled_mutate_rate": 0.3, **changes})
 
 
-def seeded_config(
-    settings: EvolutionSettings, shape: tuple[int, int, int], seed: int, genome_type: type[Any] | None = None
-) -> neat.Config:
-    """A configuration for genomes outside of a population; Python's random state begins with `seed`."""
+def seeded_config(settings: EvolutionSettings, shape: tuple[int, int, int], seed: int) -> neat.Config:
+    """A configuration for genomes outside of a population; Python's random state begins with `seed` too."""
     random.seed(seed)
-    config = neat_config(settings, 2, shape, genome_type)
-    config.genome_config.innovation_tracker = InnovationTracker()
+    config = neat_config(settings, 2, shape)
+    config.genome_config.generator = Generator(PCG64(seed))
+    config.genome_config.innovation_tracker = machinery(config)[0].innovation_tracker
     return config
 
 
 def initial_genomes(config: neat.Config, number: int) -> list[Any]:
     """Genomes of a first generation, of the configuration's class."""
-    genomes = []
-    for key in range(number):
-        genome = config.genome_type(key)
-        genome.configure_new(config.genome_config)
-        genomes.append(genome)
-    return genomes
+    return list(machinery(config)[0].create_new(config.genome_type, config.genome_config, number).values())
 
 
 def relatives(config: neat.Config, number: int, births: int) -> list[Any]:
@@ -66,7 +56,7 @@ def relatives(config: neat.Config, number: int, births: int) -> list[Any]:
     genomes = initial_genomes(config, number)
     for birth in range(births):
         parents = random.choices(genomes, k=2)
-        genomes[random.randrange(number)] = child_of(parents[0], parents[1], config, number + birth)
+        genomes[random.randrange(number)] = child_of(parents[0], parents[1], config, 1 + number + birth)
         config.genome_config.innovation_tracker.reset_generation()
     return genomes
 
@@ -93,6 +83,7 @@ def genome_of(
 
 
 def copy_of(genome: ArrayGenome) -> ArrayGenome:
+    """Another one with the same genes and fitness."""
     return genome_of(genome.nodes.tolist(), genome.connections.tolist(), genome.fitness or 0.0)
 
 

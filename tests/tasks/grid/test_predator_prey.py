@@ -13,42 +13,17 @@ from exneat_cli.brains import RandomActions, linear_fusion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import shared_episodes, stream
 from exneat_cli.tasks import ENDED, RUNNING, Foraging, Hunting
-from exneat_cli.tasks.grid.prey_dynamics import observe, paint, reset, rewind, step
+from exneat_cli.tasks.grid.predator_prey import observe, reset, rewind, step
 from exneat_cli.tasks.grid.prey_field import FREE, PREY_COLUMN, PREY_ROW, Field
 from exneat_cli.tasks.grid.world import COLUMN, COLUMN_STEPS, MOVES, ROW, ROW_STEPS, STAY
 
 ACTIONS = np.eye(len(MOVES))
-REST = ACTIONS[STAY]
-RIGHT = ACTIONS[MOVES.index("right")]
 
 
 def field_of(task: Foraging, seed: int = 0) -> Field:
-    field: Field = task.open(training=False, reset_scale=0.0).world
+    field: Field = task.open(training=False).world
     reset(field, np.random.default_rng(seed))
     return field
-
-
-def rest(field: Field) -> int:
-    status: int = step(field, REST, np.zeros(1))
-    return status
-
-
-def hide_agent(field: Field) -> None:
-    """Out of everyone's way: on a wall, where no prey can come."""
-    field.grid.agent[ROW], field.grid.agent[COLUMN] = 1, 0
-
-
-def put_prey(field: Field, *tiles: tuple[int, int]) -> None:
-    """Where the prey of a field in which they never move have always been."""
-    field.start[:] = tiles
-    field.places[:] = tiles
-    rewind(field)
-
-
-def signals_of(field: Field) -> np.ndarray:
-    signals = np.zeros_like(field.grid.signals)
-    paint(field, signals)
-    return signals
 
 
 class SlowField:
@@ -59,10 +34,9 @@ class SlowField:
 
     def __init__(self, task: Foraging, field: Field) -> None:
         self.task, self.keep = task, 1.0 - task.p_c
-        self.ways, self.emitters, self.first_of_second = field.places, field.emitters, field.first_of_second
+        self.ways, self.path = field.places, field.path
         before = np.concatenate([np.zeros_like(field.cues[:1]), field.cues[:-1]])
         self.emissions = field.cues - self.keep * before
-        self.path = field.grid.path
         self.signals = np.zeros((2, *self.path.shape))
         self.agent = (self.path.shape[0] // 2,) * 2
         self.places = [tuple(place) for place in field.start.tolist()]
@@ -80,8 +54,9 @@ class SlowField:
             self.catch(k)
             if not self.free[k]:
                 continue
-            for emitter in np.flatnonzero(self.emitters == k):
-                self.signals[int(emitter >= self.first_of_second)] += self.emissions[self.steps, :, :, emitter]
+            channels = [0, 1] if isinstance(self.task, Hunting) else [k % 2]
+            for own, channel in enumerate(channels):
+                self.signals[channel] += self.emissions[self.steps, :, :, k * len(channels) + own]
 
     def catch(self, k: int) -> None:
         self.free[k] = self.free[k] and self.places[k] != self.agent
@@ -115,10 +90,12 @@ class SlowField:
 
 
 def assert_equal(field: Field, slow: SlowField) -> None:
-    np.testing.assert_allclose(signals_of(field), slow.signals, rtol=0, atol=1e-12)
+    tiles = slow.task.tiles(field)
+    np.testing.assert_array_equal(tiles[..., 0], slow.path)
+    np.testing.assert_allclose(np.moveaxis(tiles[..., 1:], 2, 0), slow.signals, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(field.prey[:, [PREY_ROW, PREY_COLUMN]], slow.places)
     np.testing.assert_array_equal(field.prey[:, FREE], slow.free)
-    assert (field.grid.agent[ROW], field.grid.agent[COLUMN]) == slow.agent
+    assert (field.agent[ROW], field.agent[COLUMN]) == slow.agent
 
 
 def live_by_the_rule(task: Foraging, field: Field, moves: list[int] | None) -> int:
@@ -187,76 +164,24 @@ def test_prey_that_walk_into_the_agent_are_caught_even_before_the_first_step() -
     assert early > 0
 
 
-def test_tiles_show_path_and_cues_as_the_agent_senses_them() -> None:
-    task = Foraging()
-    field = field_of(task)
-    tiles = task.tiles(field)
-    np.testing.assert_array_equal(tiles[..., 0], field.grid.path)
-    np.testing.assert_array_equal(np.moveaxis(tiles[..., 1:], 2, 0), signals_of(field))
-
-
-def test_prey_never_move_in_foraging_while_the_episode_goes_on() -> None:
-    field = field_of(Foraging())
-    before = field.prey[:, :2].copy()
-    while rest(field) == RUNNING:
-        np.testing.assert_array_equal(field.prey[:, :2], before)
-
-
-def test_prey_never_leave_the_field_while_the_episode_goes_on() -> None:
-    field = field_of(Hunting(size=4, n_prey=5, p_m=1.0, steps=500))
-    while rest(field) == RUNNING:
-        assert (field.prey[:, :2] >= 1).all()
-        assert (field.prey[:, :2] <= 4).all()
-
-
 def test_foraging_prey_alternate_channels_and_hunting_prey_use_both() -> None:
-    for task, channels in (
-        (Foraging(n_prey=2, p_c=1.0), ([0], [1])),
-        (Hunting(n_prey=2, p_c=1.0, p_m=0.0), ([0, 1],) * 2),
-    ):
-        seeds = (seed for seed in range(1000) if np.abs(np.diff(field_of(task, seed).start, axis=0)).max() > 4)
-        field = field_of(task, next(seeds))
-        hide_agent(field)
-        rest(field)
-        for expected, (row, column) in zip(channels, field.start, strict=True):
-            around = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
-            assert [c for c in (0, 1) if signals_of(field)[c, *around].any()] == expected
-
-
-@pytest.mark.parametrize("p_c", [0.0, 0.3, 1.0])
-def test_a_caught_prey_neither_moves_nor_emits(p_c: float) -> None:
-    field = field_of(Hunting(n_prey=2, p_c=p_c, p_m=1.0))
-    hide_agent(field)
-    field.prey[0, FREE] = 0
-    place, cues = field.prey[0, :2].copy(), field.cues[0, :, :, [0, 2]].copy()
-    for t in range(1, 20):
-        assert rest(field) == RUNNING
-        np.testing.assert_array_equal(field.prey[0, :2], place)
-        others = field.cues[t, :, :, [1, 3]]
-        np.testing.assert_allclose(signals_of(field), others + (1.0 - p_c) ** t * cues, rtol=0, atol=1e-12)
+    # Patches of one tile are heard where their prey is alone.
+    foraging, hunting = Foraging(patch_width=1), Hunting(patch_width=1, p_m=0.0)
+    for task, expected in ((foraging, [[1.0, 0.0], [0.0, 1.0]] * 5), (hunting, [[1.0, 1.0]] * 10)):
+        field = field_of(task)
+        rows, columns = field.start.T
+        assert task.tiles(field)[rows, columns, 1:].tolist() == expected
 
 
 def test_stepping_onto_a_prey_catches_it_and_the_last_one_ends_the_episode() -> None:
-    field = field_of(Foraging(n_prey=2))
-    put_prey(field, (5, 6), (5, 7))
-    field.grid.agent[ROW], field.grid.agent[COLUMN] = 5, 5
-    terms = np.zeros(1)
-    assert step(field, RIGHT, terms) == RUNNING
-    assert list(field.prey[:, FREE]) == [0, 1]
-    assert terms[0] == 0.0
-    assert step(field, RIGHT, terms) == ENDED
+    field, terms = field_of(Foraging(n_prey=2)), np.zeros(1)
+    field.start[:] = field.places[:] = (6, 7), (6, 8)
+    rewind(field)
+    right = ACTIONS[MOVES.index("right")]
+    assert step(field, right, terms) == RUNNING
+    assert (list(field.prey[:, FREE]), terms[0]) == ([0, 1], 0.0)
+    assert step(field, right, terms) == ENDED
     assert terms[0] == 1.0
-
-
-def test_an_episode_lasts_fifty_moves_and_pays_the_share_caught() -> None:
-    field = field_of(Foraging())
-    field.prey[:3, FREE] = 0
-    hide_agent(field)
-    terms, steps = np.zeros(1), 1
-    while step(field, REST, terms) == RUNNING:
-        steps += 1
-    assert steps == 50
-    assert terms[0] == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("task", [Foraging(), Hunting()])

@@ -17,9 +17,9 @@ from exneat_cli.tasks.grid.prey_field import (
     WALK_COLUMN,
     WALK_ROW,
     Field,
-    _shuffle,
     draw_prey,
     move_prey,
+    shuffle,
 )
 from exneat_cli.tasks.grid.world import MOVES
 
@@ -27,7 +27,7 @@ ALPHA = 1e-4
 
 
 def drawn(task: Foraging, seed: int = 0) -> tuple[Field, np.random.Generator]:
-    field: Field = task.open(training=False, reset_scale=0.0).world
+    field: Field = task.open(training=False).world
     rng = np.random.default_rng(seed)
     draw_prey(field, rng)
     return field, rng
@@ -49,16 +49,16 @@ def test_prey_start_on_distinct_tiles_and_never_on_the_agents() -> None:
         tiles.update(places)
     assert len(tiles) == 99
     assert chisquare(list(tiles.values())).pvalue > ALPHA
+    full, _ = drawn(Foraging(size=3, n_prey=8))
+    assert len({tuple(place) for place in full.start.tolist()}) == 8
 
 
-def test_a_full_field_has_a_prey_on_every_other_tile() -> None:
-    field, _ = drawn(Foraging(size=3, n_prey=8))
-    assert len({tuple(place) for place in field.start.tolist()}) == 8
-
-
-def test_foraging_prey_never_move() -> None:
+def test_foraging_prey_never_move_and_hunted_ones_never_leave_the_field() -> None:
     field, _ = drawn(Foraging())
     assert (paths(field) == field.start).all()
+    field, _ = drawn(Hunting(size=4, n_prey=5, p_m=1.0, steps=500))
+    everywhere = {(row, column) for row in range(1, 5) for column in range(1, 5)}
+    assert {tuple(place) for place in paths(field).reshape(-1, 2).tolist()} == everywhere
 
 
 @pytest.mark.parametrize("motion", ["levy", "brownian"])
@@ -78,87 +78,40 @@ def test_prey_move_at_the_stated_rate_and_by_a_tile(p_m: float, motion: str) -> 
     assert binomtest(moved, steps, p_m).pvalue > ALPHA if 0 < p_m < 1 else moved == p_m * steps
 
 
-def walk_in_the_middle(field: Field, rng: np.random.Generator) -> tuple[int, int]:
-    """How the only prey moved from tile (50, 50)."""
-    field.walkers[0, [WALK_ROW, WALK_COLUMN]] = 50
-    move_prey(field.walkers, 0, field.grid.path, field.flight_chance, field.levy, rng)
-    return int(field.walkers[0, WALK_ROW]) - 50, int(field.walkers[0, WALK_COLUMN]) - 50
-
-
-def lengths_of_flights(motion: str, moves: int) -> Counter[int]:
-    """Told by the counter of steps left at each flight's start."""
-    field, rng = drawn(Hunting(size=99, n_prey=1, motion=motion))
-    field.walkers[0, FLIGHT] = 0
-    lengths: Counter[int] = Counter()
-    for _ in range(moves):
-        starts = field.walkers[0, FLIGHT] == 0
-        walk_in_the_middle(field, rng)
-        lengths[int(field.walkers[0, FLIGHT]) + 1] += bool(starts)
-    return +lengths
-
-
-def test_levy_flights_have_lengths_of_the_stated_law_and_brownian_ones_a_single_tile() -> None:
-    lengths = lengths_of_flights("levy", 20_000)
-    assert set(lengths) == set(range(1, LONGEST_FLIGHT + 1))
-    law = np.arange(1.0, LONGEST_FLIGHT + 1) ** -2
-    observed = np.array([lengths[k] for k in range(1, LONGEST_FLIGHT + 1)])
-    assert chisquare(observed, observed.sum() * law / law.sum()).pvalue > ALPHA
-    assert set(lengths_of_flights("brownian", 500)) == {1}
-
-
-def test_directions_are_equally_likely_and_a_flight_is_straight() -> None:
+@pytest.mark.parametrize("levy", [True, False])
+def test_flights_are_straight_have_equally_likely_directions_and_lengths_of_the_stated_law(levy: bool) -> None:
     field, rng = drawn(Hunting(size=99, n_prey=1))
-    field.walkers[0, FLIGHT] = 0
-    directions: Counter[tuple[int, int]] = Counter()
-    last = (0, 0)
+    walkers = np.zeros((1, 4), np.int64)
+    directions, lengths, last = Counter[tuple[int, int]](), Counter[int](), (0, 0)
     for _ in range(20_000):
-        starts = field.walkers[0, FLIGHT] == 0
-        now = walk_in_the_middle(field, rng)
+        starts = walkers[0, FLIGHT] == 0
+        walkers[0, [WALK_ROW, WALK_COLUMN]] = 50
+        move_prey(walkers, 0, field.path, levy, rng)
+        now = int(walkers[0, WALK_ROW]) - 50, int(walkers[0, WALK_COLUMN]) - 50
         if starts:
             directions[now] += 1
+            lengths[int(walkers[0, FLIGHT]) + 1] += 1
         else:
             assert now == last
         last = now
     assert len(directions) == 4
     assert chisquare(list(directions.values())).pvalue > ALPHA
-
-
-def test_a_drawn_path_flies_as_a_single_prey_does() -> None:
-    # At p_m = 1 a path inside of the walls is a string of whole flights, so its turns are as rare as theirs.
-    field, rng = drawn(Hunting(size=40, n_prey=20, p_m=1.0, steps=40))
-    straight, pairs = 0, 0
-    for _ in range(5):
-        draw_prey(field, rng)
-        moves = np.diff(paths(field), axis=0)
-        inside = np.all((paths(field) > 1) & (paths(field) < 40), axis=2)
-        both = inside[:-2] & inside[1:-1] & inside[2:]
-        straight += int((both & (moves[1:] == moves[:-1]).all(axis=2)).sum())
-        pairs += int(both.sum())
-    lengths = np.arange(1.0, LONGEST_FLIGHT + 1)
-    mean = (lengths * lengths**-2).sum() / (lengths**-2).sum()
-    # Of the moves of a flight all but the last are followed by the same, and of new directions one in four.
-    assert straight / pairs == pytest.approx(1 - 0.75 / mean, abs=0.05)
+    law = np.arange(1.0, LONGEST_FLIGHT + 1 if levy else 2) ** -2
+    observed = np.array([lengths[k] for k in range(1, len(law) + 1)])
+    assert observed.sum() == sum(lengths.values())
+    assert not levy or chisquare(observed, observed.sum() * law / law.sum()).pvalue > ALPHA
 
 
 def test_a_wall_ends_a_flight_and_the_next_one_takes_any_direction() -> None:
     field, rng = drawn(Hunting(n_prey=1))
-    ends: Counter[tuple[int, int]] = Counter()
+    walkers, ends = np.zeros((1, 4), np.int64), set()
     for _ in range(200):
-        field.walkers[0, [WALK_ROW, WALK_COLUMN, DIRECTION, FLIGHT]] = (1, 5, MOVES.index("up"), 5)
-        move_prey(field.walkers, 0, field.grid.path, field.flight_chance, field.levy, rng)
-        assert list(field.walkers[0, [WALK_ROW, WALK_COLUMN, FLIGHT]]) == [1, 5, 0]
-        move_prey(field.walkers, 0, field.grid.path, field.flight_chance, field.levy, rng)
-        ends[int(field.walkers[0, WALK_ROW]), int(field.walkers[0, WALK_COLUMN])] += 1
-    assert set(ends) == {(1, 4), (1, 6), (2, 5), (1, 5)}
-
-
-def test_nobody_leaves_the_field() -> None:
-    field, _ = drawn(Hunting(size=4, n_prey=5, p_m=1.0, steps=500))
-    assert (paths(field) >= 1).all()
-    assert (paths(field) <= 4).all()
-    assert {tuple(place) for place in field.places.reshape(-1, 2).tolist()} == {
-        (row, column) for row in range(1, 5) for column in range(1, 5)
-    }
+        walkers[0, [WALK_ROW, WALK_COLUMN, DIRECTION, FLIGHT]] = (1, 5, MOVES.index("up"), 5)
+        move_prey(walkers, 0, field.path, True, rng)
+        assert list(walkers[0, [WALK_ROW, WALK_COLUMN, FLIGHT]]) == [1, 5, 0]
+        move_prey(walkers, 0, field.path, True, rng)
+        ends.add((int(walkers[0, WALK_ROW]), int(walkers[0, WALK_COLUMN])))
+    assert ends == {(1, 4), (1, 6), (2, 5), (1, 5)}
 
 
 def lone_prey_inside(task: Foraging) -> Field:
@@ -178,101 +131,61 @@ def patches(field: Field) -> np.ndarray:
 
 
 @pytest.mark.parametrize("p_e", [0.0, 0.35, 1.0])
-def test_cues_have_a_direction_at_the_stated_rate(p_e: float) -> None:
+def test_cues_are_a_bell_in_the_middle_at_the_stated_rate_and_else_its_values_shuffled(p_e: float) -> None:
     field = lone_prey_inside(Foraging(n_prey=1, p_e=p_e, p_c=1.0, steps=2000))
+    rows, columns = np.mgrid[-2:3, -2:3]
+    bell = np.exp(-0.5 * (rows**2 + columns**2)).ravel()
     emitted = patches(field)[:, 0]
-    np.testing.assert_allclose(np.sort(emitted, axis=1), np.sort(field.patch)[None].repeat(2000, axis=0))
-    centred = int(np.isclose(emitted, field.patch).all(axis=1).sum())
+    np.testing.assert_allclose(np.sort(emitted, axis=1), np.sort(bell)[None].repeat(2000, axis=0))
+    centred = int(np.isclose(emitted, bell).all(axis=1).sum())
     assert binomtest(centred, 2000, p_e).pvalue > ALPHA if 0 < p_e < 1 else centred == p_e * 2000
 
 
-def test_a_patch_is_a_gaussian_bell_of_one_tile() -> None:
-    field = lone_prey_inside(Foraging(n_prey=1, p_e=1.0, p_c=1.0, steps=1))
-    rows, columns = np.mgrid[-2:3, -2:3]
-    np.testing.assert_allclose(patches(field)[0, 0], np.exp(-0.5 * (rows**2 + columns**2)).ravel())
-    assert field.cues.sum() == pytest.approx(patches(field).sum())
-
-
-def test_shuffled_cues_are_uniform_over_the_tiles() -> None:
-    rng, counts = np.random.default_rng(3), np.zeros((25, 25))
-    for _ in range(20_000):
-        values = np.arange(25.0)
-        _shuffle(values, rng)
-        counts[np.arange(25), values.astype(int)] += 1
-    assert chisquare(counts, axis=None).pvalue > ALPHA
-
-
 def test_every_order_of_a_shuffle_is_equally_likely() -> None:
-    rng = np.random.default_rng(4)
-    orders: Counter[tuple[float, ...]] = Counter()
-    for _ in range(12_000):
-        values = np.arange(4.0)
-        _shuffle(values, rng)
-        orders[tuple(values)] += 1
-    assert len(orders) == 24
+    # Five choices need two random numbers.
+    rng, values, orders = np.random.default_rng(4), np.arange(6.0), Counter[bytes]()
+    for _ in range(40_000):
+        shuffle(values, rng)
+        orders[values.tobytes()] += 1
+    assert len(orders) == 720
     assert chisquare(list(orders.values())).pvalue > ALPHA
 
 
 def test_the_channels_of_a_hunted_prey_have_a_direction_independently() -> None:
     p_e = 0.35
     field = lone_prey_inside(Hunting(n_prey=1, p_e=p_e, p_c=1.0, p_m=0.0, steps=4000))
-    first, second = np.isclose(patches(field), field.patch).all(axis=2).T
+    first, second = np.isclose(patches(field), field.patch.ravel()).all(axis=2).T
     observed = [int(kind.sum()) for kind in (first & second, first & ~second, ~first & second, ~first & ~second)]
     law = np.array([p_e * p_e, p_e * (1 - p_e), (1 - p_e) * p_e, (1 - p_e) ** 2])
     assert chisquare(observed, 4000 * law).pvalue > ALPHA
 
 
-def near(field: Field, t: int, k: int) -> np.ndarray:
-    """(N, N) whether prey `k` can reach a tile with what it emits when the agent senses for the t-th time."""
-    rows, columns = np.indices(field.cues.shape[1:3])
-    row, column = field.places[t, k]
-    distances = np.maximum(np.abs(rows - row), np.abs(columns - column))
-    reached: np.ndarray = (field.grid.path == 1) & (distances <= field.width // 2)
-    return reached
-
-
-def test_at_full_decay_no_trail_is_left() -> None:
-    field, _ = drawn(Hunting(n_prey=3, p_c=1.0, p_m=1.0))
-    for t in range(len(field.cues)):
-        for emitter, k in enumerate(field.emitters):
-            np.testing.assert_array_equal(field.cues[t, :, :, emitter] > 0, near(field, t, k))
-
-
-def test_without_decay_cues_never_fade() -> None:
-    field = lone_prey_inside(Hunting(n_prey=1, p_e=1.0, p_c=0.0, p_m=0.0, steps=100))
-    for channel in (0, 1):
-        np.testing.assert_allclose(patches(field)[:, channel], np.outer(np.arange(1, 101), field.patch))
-    field, _ = drawn(Hunting(p_c=0.0, p_m=1.0))
-    assert (np.diff(field.cues, axis=0) >= 0).all()
-
-
-@pytest.mark.parametrize("parameters", [{"p_c": 0.2}, {"p_c": 0.5, "patch_width": 1}, {"p_c": 0.5, "patch_width": 7}])
-def test_cues_fade_by_the_stated_share_and_come_from_around_the_prey_alone(parameters: dict[str, Any]) -> None:
-    field, _ = drawn(Hunting(p_m=1.0, **parameters))
+@pytest.mark.parametrize(
+    ("world", "parameters"),
+    [
+        (Hunting, {"p_c": 0.2}),
+        (Hunting, {"p_c": 0.0, "p_e": 0.3}),
+        (Hunting, {"p_c": 1.0, "n_prey": 3}),
+        (Hunting, {"p_c": 0.5, "patch_width": 1}),
+        (Hunting, {"p_c": 0.5, "patch_width": 7, "size": 5}),
+        (Foraging, {"p_c": 0.5}),
+    ],
+)
+def test_cues_fade_by_the_stated_share_and_come_from_open_tiles_around_their_prey_alone(
+    world: type[Foraging], parameters: dict[str, Any]
+) -> None:
+    task = world(**parameters, **({"p_m": 1.0} if world is Hunting else {}))
+    field, _ = drawn(task)
+    rows, columns = np.indices(field.path.shape)
     trails = 0
     for t in range(len(field.cues)):
-        for emitter, k in enumerate(field.emitters):
-            faded = (1.0 - parameters["p_c"]) * field.cues[t - 1, :, :, emitter] if t > 0 else np.zeros((12, 12))
+        for emitter in range(field.cues.shape[3]):
+            row, column = field.places[t, emitter // task.channels]
+            near = np.maximum(np.abs(rows - row), np.abs(columns - column)) <= task.patch_width // 2
+            near &= field.path == 1
+            faded = (1.0 - task.p_c) * field.cues[t - 1, :, :, emitter] if t > 0 else np.zeros(field.path.shape)
             added = field.cues[t, :, :, emitter] - faded
-            trails += int(faded[~near(field, t, k)].any())
-            np.testing.assert_allclose(added[~near(field, t, k)], 0.0, rtol=0, atol=1e-12)
-            values = added[near(field, t, k)]
-            assert (np.isclose(values[:, None], field.patch[None], rtol=0, atol=1e-12).any(axis=1)).all()
-    assert trails > 0
-
-
-def test_walls_carry_no_cues() -> None:
-    field, _ = drawn(Hunting(size=5, patch_width=7))
-    assert not field.cues[:, field.grid.path == 0].any()
-    assert (field.cues[:, field.grid.path == 1] > 0).any()
-
-
-def test_what_is_drawn_keeps_nothing_of_the_world_before() -> None:
-    field, rng = drawn(Hunting(p_e=0.0))
-    draw_prey(field, np.random.default_rng(7))
-    first = [field.start.copy(), field.places.copy(), field.cues.copy()]
-    for _ in range(3):
-        draw_prey(field, rng)
-    draw_prey(field, np.random.default_rng(7))
-    for values, expected in zip([field.start, field.places, field.cues], first, strict=True):
-        np.testing.assert_array_equal(values, expected)
+            trails += int(faded[~near].any())
+            np.testing.assert_allclose(added[~near], 0.0, rtol=0, atol=1e-12)
+            assert np.isclose(added[near][:, None], field.patch.ravel(), rtol=0, atol=1e-9).any(axis=1).all()
+    assert (trails > 0) == (task.p_c < 1.0 and world is Hunting)

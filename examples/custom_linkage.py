@@ -1,0 +1,26 @@
+"""A linkage of one's own: in a ring, each module reads the outputs of its neighbour.
+
+    python examples/custom_linkage.py train --config-dir examples/conf task=track_maze linkage=ring
+
+This file is the program exneat with one linkage more; conf/linkage/ring.yaml beside it is what `linkage=ring` finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from exneat_cli.main import main
+from exneat_cli.tasks import Part
+from exneat_cli.wiring import LINKAGES, Pin, Sizes, counter_clockwise
+
+
+def ring(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+    """The outputs of the next part module, counter-clockwise, as they were at the previous step."""
+    neighbours = counter_clockwise(parts, own)[:1]
+    return tuple(Pin(k, peer, delayed=True) for peer in neighbours for k in range(sizes.outputs[peer]))
+
+
+LINKAGES["ring"] = ring
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,239 @@
+"""Everything that reaches into neat-python 2.0.0, in one place.
+
+Its species, stagnation and reproduction stay in charge. What is reached into, and why:
+
+* its random numbers come from Python's global generator, which any thread may draw from: `drawing_from`;
+* its reproduction aborts when species are many, and gives every genome hidden nodes of its own: `SteadyReproduction`;
+* its counters cannot be read, and its species cannot be restored: `counter`, `state_of` and `restore`;
+* its configuration is read from an INI file alone: `neat_config`.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+import random
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import neat
+import neat.attributes
+import neat.genes
+import neat.genome
+import neat.reproduction
+from neat.reporting import ReporterSet
+from neat.species import DefaultSpeciesSet, Species
+
+from exneat_cli.algorithms.neat.genome import ArrayGenome
+from exneat_cli.algorithms.neat.settings import EvolutionSettings
+from exneat_cli.interruption import uninterrupted
+
+LARGEST_ID = 2**62
+"""No id, key or number reaches it."""
+
+_GENOMES = {"array": ArrayGenome, "stock": neat.DefaultGenome}
+_DRAWN = [
+    (module, name, value)
+    for module in (neat.attributes, neat.genes, neat.genome, neat.reproduction)
+    for name, value in vars(module).items()
+    if value is random or getattr(value, "__self__", None) is random.random.__self__  # type: ignore[attr-defined]
+]
+"""The names in neat-python's modules that stand for `random`, or for a method of its global generator."""
+_DRAWING = threading.Lock()
+_FIXED = """
+weight_init_mean=0 bias_init_mean=0 enabled_default=True single_structural_mutation=False
+response_init_mean=1 response_init_stdev=0 response_min_value=-1 response_max_value=1
+response_mutate_rate=0 response_replace_rate=0 response_mutate_power=0
+activation_mutate_rate=0 aggregation_default=sum aggregation_options=sum aggregation_mutate_rate=0
+"""
+"""Items of a genome that no setting changes. Left out, `single_structural_mutation` is the text "false", which
+neat-python takes for true."""
+
+
+@contextmanager
+def drawing_from(chance: random.Random) -> Iterator[None]:
+    """While inside, neat-python draws from `chance` instead of Python's global generator.
+
+    Other threads draw from that one whenever they like (dask's do), also while genomes reproduce. One training at a
+    time is let in. Signals are put off, see `uninterrupted`.
+    """
+    with uninterrupted(), _DRAWING:
+        try:
+            for module, name, drawn in _DRAWN:
+                setattr(module, name, chance if drawn is random else getattr(chance, drawn.__name__))
+            yield
+        finally:
+            for module, name, drawn in _DRAWN:
+                setattr(module, name, drawn)
+
+
+def counter(following: int) -> Iterator[int]:
+    """`following`, then the next whole number, and so on: `itertools.count`, but `peek` can read it."""
+    return iter(range(following, LARGEST_ID))
+
+
+def peek(numbers: Iterator[int]) -> int:
+    """What a `counter` gives next, without taking it."""
+    return next(copy.copy(numbers))
+
+
+class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
+    """neat-python's reproduction, for any number of species, from homologous first genomes."""
+
+    def __init__(self, config: Any, reporters: ReporterSet, stagnation: Any) -> None:
+        super().__init__(config, reporters, stagnation)
+        self.genome_indexer = counter(1)
+
+    def create_new(self, genome_type: Any, genome_config: Any, num_genomes: int) -> dict[int, Any]:
+        """Initial genomes by id, in which the initial hidden nodes have the same keys.
+
+        neat-python counts on from genome to genome. Crossover and distance then see no hidden node in common, and
+        every genome founds a species of its own.
+        """
+        first, hidden = genome_config.num_outputs, genome_config.num_hidden
+        later_nodes = genome_config.node_indexer or counter(first + hidden)
+        genome_config.node_indexer = itertools.cycle(range(first, first + hidden))
+        genomes: dict[int, Any] = super().create_new(genome_type, genome_config, num_genomes)
+        genome_config.node_indexer = later_nodes
+        if genome_config.positive_start and issubclass(genome_type, neat.DefaultGenome):
+            for genome in genomes.values():
+                for gene in genome.connections.values():
+                    gene.weight = abs(gene.weight)
+        return genomes
+
+    def reproduce(
+        self, config: neat.Config, species: DefaultSpeciesSet, pop_size: int, generation: int
+    ) -> dict[int, Any]:
+        """The next generation by id, after elitism and minimum species size were cut to what fits.
+
+        neat-python stops a run when the species together may claim more than the population.
+        """
+        configured = self.reproduction_config
+        elitism, min_species_size = configured.elitism, configured.min_species_size
+        share = pop_size // len(species.species)
+        configured.elitism, configured.min_species_size = min(elitism, share), min(min_species_size, share)
+        try:
+            genomes: dict[int, Any] = super().reproduce(config, species, pop_size, generation)
+        finally:
+            configured.elitism, configured.min_species_size = elitism, min_species_size
+        # neat-python keeps every genome's parents for ever, and asks for none of them.
+        self.ancestors.clear()
+        return genomes
+
+    def _adjust_spawn_exact(self, spawn_amounts: list[int], pop_size: int, min_species_size: int) -> list[int]:
+        # neat-python takes one genome away from each species and stops the run if that was not enough.
+        amounts = list(spawn_amounts)
+        while sum(amounts) > pop_size:
+            for index in sorted(range(len(amounts)), key=lambda index: -amounts[index]):
+                if sum(amounts) > pop_size and amounts[index] > min_species_size:
+                    amounts[index] -= 1
+        adjusted: list[int] = super()._adjust_spawn_exact(amounts, pop_size, min_species_size)
+        return adjusted
+
+
+def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, int, int]) -> neat.Config:
+    """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
+
+    Its `genome_config` has two attributes more: `positive_start`, and `generator`, which must be set before array
+    genomes are made, since they draw from it.
+
+    Args:
+        settings: see there.
+        population: genomes per generation.
+        shape: numbers of inputs, initial hidden nodes and outputs.
+    """
+    inputs, hidden, outputs = shape
+    config = neat.Config.__new__(neat.Config)
+    config.pop_size, config.genome_type = population, _GENOMES[settings.genome]
+    config.species_set_type, config.stagnation_type = DefaultSpeciesSet, neat.DefaultStagnation
+    config.reproduction_type = SteadyReproduction
+    # Only neat-python's own `Population` asks for these.
+    config.fitness_criterion, config.fitness_threshold, config.no_fitness_termination = "max", 0.0, True
+    config.reset_on_extinction, config.seed, config.config_information = True, None, None
+    config.species_set_config = _parsed(DefaultSpeciesSet, settings, ["compatibility_threshold"])
+    config.stagnation_config = _parsed(
+        neat.DefaultStagnation, settings, ["max_stagnation", "species_elitism"], species_fitness_func="max"
+    )
+    config.reproduction_config = _parsed(
+        SteadyReproduction, settings, ["elitism", "survival_threshold", "min_species_size"]
+    )
+    config.genome_config = _parsed(
+        neat.DefaultGenome,
+        settings,
+        vars(settings),  # it passes over those that it does not know
+        **dict(item.split("=") for item in _FIXED.split()),
+        num_inputs=inputs,
+        num_hidden=hidden,
+        num_outputs=outputs,
+        activation_options=settings.activation_default,
+        weight_min_value=-settings.weight_max_value,
+        bias_min_value=-settings.bias_max_value,
+    )
+    config.genome_config.positive_start, config.genome_config.generator = settings.positive_start, None
+    return config
+
+
+def _parsed(kind: Any, settings: EvolutionSettings, names: Iterable[str], **others: object) -> Any:
+    """What `kind` makes of some of the settings, which have neat-python's names, and others; a file is all text."""
+    items = {name: getattr(settings, name) for name in names} | others
+    return kind.parse_config({name: str(value) for name, value in items.items()})
+
+
+def machinery(config: neat.Config) -> tuple[SteadyReproduction, DefaultSpeciesSet]:
+    """Reproduction and species of one subpopulation, as new."""
+    reporters = ReporterSet()
+    stagnation = neat.DefaultStagnation(config.stagnation_config, reporters)
+    species_set = DefaultSpeciesSet(config.species_set_config, reporters)
+    species_set.indexer = counter(1)
+    return SteadyReproduction(config.reproduction_config, reporters, stagnation), species_set
+
+
+def state_of(config: neat.Config, reproduction: SteadyReproduction, species_set: DefaultSpeciesSet) -> dict[str, Any]:
+    """Counters and species as numbers, strings, lists and dicts."""
+    return {
+        "next_genome": peek(reproduction.genome_indexer),
+        "next_species": peek(species_set.indexer),
+        "next_node": peek(config.genome_config.node_indexer),
+        "next_innovation": reproduction.innovation_tracker.global_counter + 1,
+        "species": [
+            {name: getattr(species, name) for name in ("key", "created", "last_improved")}
+            | {"representative": species.representative.key, "members": list(species.members)}
+            | {"fitness_history": list(species.fitness_history)}
+            for species in species_set.species.values()
+        ],
+    }
+
+
+def restore(
+    config: neat.Config,
+    reproduction: SteadyReproduction,
+    species_set: DefaultSpeciesSet,
+    state: Mapping[str, Any],
+    genomes: Mapping[int, Any],
+) -> None:
+    """Bring counters and species, as new, into the state that `state_of` gave.
+
+    Raises:
+        KeyError, OverflowError, TypeError, ValueError: the state is none, or does not fit the genomes.
+    """
+    reproduction.genome_indexer = counter(state["next_genome"])
+    reproduction.innovation_tracker.global_counter = state["next_innovation"] - 1
+    config.genome_config.node_indexer = counter(state["next_node"])
+    species_set.indexer = counter(state["next_species"])
+    for entry in state["species"]:
+        species = Species(int(entry["key"]), int(entry["created"]))
+        species.last_improved = int(entry["last_improved"])
+        species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
+        if not all(map(math.isfinite, species.fitness_history)):
+            raise ValueError(f"species {species.key}: expected finite fitness, got {species.fitness_history}")
+        if species.key in species_set.species or not entry["members"]:
+            raise ValueError(f"species {species.key}: comes twice, or has no members")
+        members = {int(key): genomes[int(key)] for key in entry["members"]}
+        species.update(genomes[int(entry["representative"])], members)
+        species_set.species[species.key] = species
+        species_set.genome_to_species |= dict.fromkeys(members, species.key)
+    if sorted(key for species in species_set.species.values() for key in species.members) != sorted(genomes):
+        raise ValueError("expected every genome in one species")

@@ -1,0 +1,137 @@
+"""Ctrl-C and SIGTERM: both raise KeyboardInterrupt in the main thread; a second Ctrl-C ends the process at once.
+
+Files are written atomically and checkpoints are exact, so a run may be interrupted almost anywhere and resumes to the
+same bytes. Three things need care: compiled code that reads NumPy's generators (`uninterrupted`), libraries that
+raise another error instead (`signal_heard`), and the workers of Hydra's launchers (`launching`, `as_worker`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+_SIGNALS: tuple[int, ...] = (signal.SIGTERM, signal.SIGINT)
+_heard: int | None = None
+_workplace: int | None = None
+
+
+def listen() -> dict[int, Any]:
+    """Raise KeyboardInterrupt upon the next Ctrl-C or SIGTERM; for the main thread. Returns the handlers of before."""
+    global _heard
+    _heard = None
+    return _set_handlers(dict.fromkeys(_SIGNALS, _hear))
+
+
+@contextlib.contextmanager
+def listening() -> Iterator[None]:
+    """`listen` while inside; afterwards signals are handled as before."""
+    global _heard
+    before = listen()
+    try:
+        yield
+    finally:
+        _heard = None
+        _set_handlers(before)
+
+
+def signal_heard() -> int | None:
+    """Number of the signal that was heard, None before: whatever error surfaces after it is the interruption."""
+    return _heard
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Put signals off until the end of the block; does nothing outside of the main thread, which alone hears them.
+
+    numba 0.68 reads NumPy's generators through Python code, and a signal that raises there crashes the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = _set_handlers(dict.fromkeys(_SIGNALS, lambda number, _: waiting.append(number)))
+    try:
+        yield
+    finally:
+        _set_handlers(before)
+        for number in waiting:
+            os.kill(os.getpid(), number)
+
+
+@contextlib.contextmanager
+def launching(workplace: Path) -> Iterator[None]:
+    """For whoever starts workers: they do not hear the terminal's Ctrl-C, and a signal ends their jobs first.
+
+    Args:
+        workplace: a directory of this machine, which workers lock during a job.
+    """
+    global _workplace
+    from multiprocessing import resource_tracker  # takes longer to import than --help to answer
+
+    resource_tracker.ensure_running()  # its first start would unblock the signals
+    over = threading.Event()
+    # Children inherit what the main thread blocks; this one takes the signals, which Python handles in the main one.
+    threading.Thread(target=over.wait, daemon=True).start()
+    _workplace = os.open(workplace, os.O_RDONLY)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+        os.close(_workplace)
+        _workplace = None
+        over.set()
+
+
+@contextlib.contextmanager
+def as_worker(workplace: Path) -> Iterator[None]:
+    """For a job in a worker: SIGTERM interrupts it and refuses the next, and the process ends with its parent."""
+    import ctypes
+    import multiprocessing
+
+    if _heard is not None:
+        raise KeyboardInterrupt
+    with contextlib.suppress(AttributeError):  # Linux alone has it
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    if (parent := multiprocessing.parent_process()) and parent.pid != os.getppid():
+        os._exit(1)
+    with contextlib.ExitStack() as ending:
+        with contextlib.suppress(FileNotFoundError):  # on another machine
+            lock = os.open(workplace, os.O_RDONLY)
+            ending.callback(os.close, lock)
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        signal.signal(signal.SIGTERM, _hear)
+        ending.callback(signal.pthread_sigmask, signal.SIG_BLOCK, {signal.SIGTERM})
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+        yield
+
+
+def _hear(number: int, _: object) -> None:
+    global _heard
+    _heard = number
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # whoever sends it to a whole group has a worker hear it twice
+    if _workplace is not None:
+        for process in _descendants(os.getpid()):
+            with contextlib.suppress(OSError):
+                os.kill(process, signal.SIGTERM)
+        fcntl.flock(_workplace, fcntl.LOCK_EX)  # joblib kills its workers upon KeyboardInterrupt: let jobs end first
+    raise KeyboardInterrupt
+
+
+def _set_handlers(handlers: dict[int, Any]) -> dict[int, Any]:
+    return {number: signal.signal(number, handler or signal.SIG_DFL) for number, handler in handlers.items()}
+
+
+def _descendants(process: int) -> Iterator[int]:
+    """Ids of the processes that one started, and so on; none where /proc is missing."""
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        with contextlib.suppress(OSError):
+            for child in path.read_text(encoding="ascii").split():
+                yield from (int(child), *_descendants(int(child)))

@@ -1,0 +1,135 @@
+"""Settings of episodes: where they run, what disturbs the agent, and sweeps of one setting."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real, check_whole, is_finite
+from exneat_cli.tasks import HasInitialPose, Task
+
+EXECUTORS = ("threads", "serial", "dask")
+_ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
+
+
+@dataclass(frozen=True)
+class Executor:
+    """Where episodes run; results do not depend on it.
+
+    Attributes:
+        name: ``threads``, ``serial`` for one thread, or ``dask`` for the worker processes of a cluster.
+        workers: number of threads, or of processes with one thread each; 0 takes every core this process may
+            use. A cluster at an address has workers of its own: 0 there.
+        address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
+            this machine.
+
+    Raises:
+        ConfigError: a value is out of range, or makes no sense with this name.
+    """
+
+    name: str = "threads"
+    workers: int = 0
+    address: str | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("executor.name", self.name, EXECUTORS)
+        check_whole("executor.workers", self.workers, 0, 1 if self.name == "serial" else 4096)
+        if self.address is None:
+            return
+        if self.name != "dask":
+            raise ConfigError("executor.address", f"none with executor={self.name}", self.address, "executor=dask has")
+        if not isinstance(self.address, str) or not _ADDRESS.fullmatch(self.address):
+            raise ConfigError("executor.address", "a scheduler's address such as tcp://10.0.0.1:8786", self.address)
+        if self.workers:
+            fix = "a cluster at an address has the workers that were started for it"
+            raise ConfigError("executor.workers", "0 together with executor.address", self.workers, fix)
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that run at once, in this process or in workers that it starts."""
+        if self.name == "serial":
+            return 1
+        return self.workers or _usable_cores()
+
+    def check_installed(self) -> None:
+        """Refuse to begin without the library that this executor needs.
+
+        Raises:
+            ExneatError: it is dask, which is not installed.
+        """
+        if self.name == "dask" and find_spec("distributed") is None:
+            raise ExneatError("executor=dask: expected dask, which is not installed\n  pip install 'exneat[dask]'")
+
+
+def _usable_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What disturbs the agent.
+
+    Attributes:
+        sensor_std: sd of the normal noise on every reading at every step, in the reading's own unit.
+        reset_scale: size of the noise on the initial pose, uniform on positions (rad, m) and normal on
+            velocities (rad/s, m/s); 0.1 is the default of Gymnasium's Ant.
+
+    Raises:
+        ConfigError: a value is negative or not finite.
+    """
+
+    sensor_std: float = 0.0
+    reset_scale: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_real("noise.sensor_std", self.sensor_std, 0.0)
+        check_real("noise.reset_scale", self.reset_scale, 0.0)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A setting of the task or of the noise, the very ones that training uses, and the levels that it goes through.
+
+    Attributes:
+        name: e.g. ``sensor_noise``.
+        parameter: the setting, below ``task.`` or ``noise.``.
+        levels: its values, all different.
+
+    Raises:
+        ConfigError: there are no levels, or one is no finite number or comes twice.
+    """
+
+    name: str
+    parameter: str
+    levels: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "levels", tuple(self.levels))
+        if not self.levels:
+            raise ConfigError("sweep.levels", f"at least one level of {self.parameter}", list(self.levels))
+        for level in self.levels:
+            if isinstance(level, bool) or not isinstance(level, int | float) or not is_finite(level):
+                raise ConfigError("sweep.levels", f"finite numbers, levels of {self.parameter}", level)
+        if len(set(self.levels)) < len(self.levels):
+            raise ConfigError("sweep.levels", "levels that all differ", list(self.levels))
+
+
+def perturbed(task: Task, noise: Noise, sweep: Sweep, level: float) -> tuple[Task, Noise]:
+    """Task and noise with the sweep's setting at another level.
+
+    Raises:
+        ConfigError: the task has no such setting, or it refuses the level.
+    """
+    section, _, name = sweep.parameter.partition(".")
+    part = {"task": task, "noise": noise}.get(section)
+    if part is None or name not in {field.name for field in dataclasses.fields(part)}:  # type: ignore[arg-type]
+        raise ConfigError("sweep", f"a sweep that fits task={task.name}", sweep.name, f"it has no {sweep.parameter}")
+    if sweep.parameter == "noise.reset_scale" and not isinstance(task, HasInitialPose):
+        raise ConfigError("sweep", f"a sweep that fits task={task.name}", sweep.name, "it has no initial pose")
+    changed = dataclasses.replace(part, **{name: level})  # type: ignore[type-var]
+    return (changed, noise) if section == "task" else (task, changed)  # type: ignore[return-value]

@@ -1,0 +1,196 @@
+"""Ctrl-C and SIGTERM, in processes of their own where they may end one."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import listening, signal_heard, uninterrupted
+from exneat_cli.main import main
+
+PRELUDE = """
+import os, pathlib, signal, subprocess, sys, time
+from exneat_cli.interruption import as_worker, launching, listen, signal_heard, uninterrupted
+"""
+
+
+def in_process(code: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run code in a session of its own, so that it may signal all of its group."""
+    return subprocess.run(
+        [sys.executable, "-c", PRELUDE + textwrap.dedent(code), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_raises_keyboard_interrupt_and_is_known_afterwards(number: int) -> None:
+    before = signal.getsignal(number)
+    with listening():
+        assert signal_heard() is None
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+        assert signal_heard() == number
+    assert (signal_heard(), signal.getsignal(number)) == (None, before)
+
+
+def test_a_second_ctrl_c_ends_the_process_at_once() -> None:
+    done = in_process("""
+        listen()
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            print("first", flush=True)
+            os.kill(os.getpid(), signal.SIGINT)
+            print("never")
+    """)
+    assert (done.stdout, done.returncode) == ("first\n", -signal.SIGINT)
+
+
+def test_a_second_sigterm_changes_nothing_for_timeout_may_send_two() -> None:
+    with listening():
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.mark.parametrize("handled_by", ["exneat", "Python"])
+def test_what_must_not_be_interrupted_is_finished_first(handled_by: str) -> None:
+    done = []
+
+    def work() -> None:
+        with uninterrupted():
+            with uninterrupted():
+                signal.raise_signal(signal.SIGINT)
+                done.append("inner")
+            done.append("outer")
+        done.append("never")
+
+    before = signal.getsignal(signal.SIGINT)
+    with listening():
+        if handled_by == "Python":
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        with pytest.raises(KeyboardInterrupt):
+            work()
+    assert done == ["inner", "outer"]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_signals_while_genomes_reproduce_crash_nothing() -> None:
+    done = in_process("""
+        import random
+        from exneat_cli.algorithms import EvolutionSettings, neat_config
+        from exneat_cli.algorithms.neat.subpopulation import Subpopulation
+        from exneat_cli.seeding import stream
+
+        subpopulation = Subpopulation(neat_config(EvolutionSettings(), 20, (4, 3, 2)), stream(0, "evolution", 0))
+        signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        chance, heard = random.Random(0), 0
+        for generation in range(1500):
+            listen()
+            try:
+                signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 1e-3))
+                subpopulation.advance(dict.fromkeys(subpopulation.genomes, 0.0))
+                signal.setitimer(signal.ITIMER_REAL, 0)
+            except KeyboardInterrupt:
+                heard += 1
+        print(heard > 100)
+    """)
+    assert (done.stdout, done.stderr, done.returncode) == ("True\n", "", 0)
+
+
+@pytest.mark.parametrize(
+    "error", [KeyboardInterrupt(), ValueError("Invalid bounding box"), ExneatError("no such file")]
+)
+def test_whatever_error_comes_after_a_signal_is_the_interruption(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(name: str) -> None:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise error from None
+
+    monkeypatch.setattr("exneat_cli.main.importlib.import_module", interrupted)
+    assert main(["report"]) == 143
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("exneat: interrupted; run the same command again to resume")
+
+
+def test_a_program_that_is_done_ends_with_its_own_exit_code_whatever_comes_late() -> None:
+    done = in_process("""
+        from exneat_cli.main import program
+        sys.argv[1:] = ["--version"]
+        program()
+        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGINT)
+        raise SystemExit(7)
+    """)
+    assert (done.returncode, done.stderr) == (7, "")
+
+
+WORKER = """
+try:
+    with as_worker(pathlib.Path(sys.argv[1])):
+        with uninterrupted():
+            print("begun", flush=True)
+            time.sleep(0.3)
+            pathlib.Path(sys.argv[1], "written").touch()
+        time.sleep(60)
+except KeyboardInterrupt:
+    try:
+        with as_worker(pathlib.Path(sys.argv[1])):
+            print("never", flush=True)
+    except KeyboardInterrupt:
+        pathlib.Path(sys.argv[1], "refused").touch()
+        time.sleep(60)
+"""
+LAUNCHER = f"""
+listen()
+place = pathlib.Path(sys.argv[1])
+try:
+    with launching(place):
+        worker = subprocess.Popen([sys.executable, "-c", {PRELUDE + WORKER!r}, place], stdout=subprocess.PIPE)
+        worker.stdout.readline()
+        SEND
+        while True:
+            time.sleep(0.01)
+except KeyboardInterrupt:
+    print(worker.poll(), (place / "written").exists())
+    while not (place / "refused").exists():
+        time.sleep(0.01)
+    print("refused", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "send", ["os.killpg(0, signal.SIGINT)", "os.kill(os.getpid(), signal.SIGTERM)", "os.killpg(0, signal.SIGTERM)"]
+)
+def test_jobs_of_workers_end_before_anybody_may_kill_them_and_begin_no_more(tmp_path: Path, send: str) -> None:
+    done = in_process(LAUNCHER.replace("SEND", send), tmp_path)
+    assert (done.stdout, done.stderr, done.returncode) == ("None True\nrefused\n", "", 0)
+
+
+def test_workers_end_with_a_launcher_that_was_killed(tmp_path: Path) -> None:
+    done = in_process(LAUNCHER.replace("SEND", "os.kill(os.getpid(), signal.SIGKILL)"), tmp_path)
+    assert done.returncode == -signal.SIGKILL  # and nobody holds its streams any more, or it would still be waited for
+
+
+def test_a_job_on_another_machine_is_done_without_the_launchers_directory(tmp_path: Path) -> None:
+    done = in_process(
+        """
+        with as_worker(pathlib.Path(sys.argv[1])):
+            print("done")
+    """,
+        tmp_path / "elsewhere",
+    )
+    assert done.stdout == "done\n"
