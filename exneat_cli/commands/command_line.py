@@ -30,8 +30,6 @@ import exneat_cli
 from exneat_cli.commands.hydra_messages import in_words
 from exneat_cli.errors import ConfigError, ExneatError
 
-PRIMARY = {"train": "config"}
-"""What a command's composition starts from in conf/, where the file is not called like the command."""
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
 _OF_LISTS = ("sweep",)
@@ -91,7 +89,7 @@ class CommandLine:
         overrides = [*self.settings, f"hydra.searchpath=[{places}]"]
         with contextlib.ExitStack() as ending:
             try:
-                ending.enter_context(hydra.initialize_config_dir(first, version_base="1.3"))
+                ending.enter_context(hydra.initialize_config_dir(first, job_name="exneat", version_base="1.3"))
                 config = hydra.compose(self.primary, overrides=overrides, return_hydra_config=True)
             except Exception as error:  # Hydra and YAML raise errors of many kinds
                 raise ExneatError(in_words(error, self.directories)) from error
@@ -116,14 +114,13 @@ class CommandLine:
             return yaml.safe_dump(self.compose(), sort_keys=False, allow_unicode=True).rstrip()
         with self.composed() as config:
             choices = dict(reversed(config.hydra.runtime.choices.items()))
-        files = {str(self.primary): ""} | ({"config": "\n"} if "task" in choices and self.primary != "config" else {})
-        files |= {f"{group}/{option}": f"\n# {group}={option}\n" for group, option in choices.items()}
-        parts = []
+        files = {str(self.primary): "", **({"config": ""} if "task" in choices else {})}
+        files |= {f"{group}/{option}": f"# {group}={option}\n" for group, option in choices.items()}
+        texts = []
         for name, title in files.items():
-            paths = [directory / f"{name}.yaml" for directory in self.directories]
-            text = next((path.read_text(encoding="utf-8") for path in paths if path.exists()), "")
-            parts.append(title + text.removeprefix("# @package _global_\n") if text else "")
-        return "".join(parts).rstrip()
+            paths = [path for directory in self.directories if (path := directory / f"{name}.yaml").exists()]
+            texts += [title + path.read_text("utf-8").removeprefix("# @package _global_\n") for path in paths[:1]]
+        return "\n".join(texts).rstrip()
 
 
 def shipped_directory(name: str) -> Path:
@@ -163,7 +160,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
     read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
     return CommandLine(
         words=("exneat", command, *arguments),
-        primary=flags.config_name or PRIMARY.get(command, command),
+        primary=flags.config_name or ("config" if command == "train" else command),
         directories=directories,
         settings=tuple(text for text in read if not _is_hydras(text)),
         launcher=tuple(text for text in read if _is_hydras(text)),

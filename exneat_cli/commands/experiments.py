@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,7 @@ class Condition:
 
     label: str
     settings: Mapping[str, Any]
-    sweeps: list[str] = field(default_factory=list)
+    sweeps: list[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,9 @@ def _variant(key: str, entry: Any) -> Variant:
 def _condition(key: str, entry: Any) -> Condition:
     condition = build(Condition, entry, f"{key}.")
     check_text(f"{key}.label", condition.label)
-    if not isinstance(condition.sweeps, list) or not all(isinstance(sweep, str) for sweep in condition.sweeps):
-        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", condition.sweeps)
+    sweeps = condition.sweeps or []
+    if not isinstance(sweeps, list) or not all(isinstance(sweep, str) for sweep in sweeps):
+        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", sweeps)
     return replace(condition, settings=_settings(f"{key}.settings", condition.settings))
 
 

@@ -53,13 +53,16 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
     """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
     with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
-        _refuse_calls(OmegaConf.to_container(config.hydra), "hydra")
-        context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())
         try:
+            OmegaConf.resolve(config.hydra.launcher)
+            _refuse_calls(OmegaConf.to_container(config), "")
+            context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())
             launcher = Plugins.instance().instantiate_launcher(context, task, config)
             with launching(workplace):
                 done = launcher.launch([[f"+job={k}"] for k in range(count)], initial_job_idx=0)
             return [str(each.return_value) for each in done]
+        except ExneatError:
+            raise
         except Exception as error:  # launchers and their libraries raise errors of many kinds
             if signal_heard() is not None:
                 raise
@@ -90,6 +93,6 @@ def _refuse_calls(node: Any, key: str) -> None:
     """Refuse settings of Hydra's that would call something; its launchers are plug-ins, which it checks itself."""
     children = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
     for name, child in children:
-        if name in ("_target_", "()") and key not in ("hydra.launcher", "hydra.sweeper"):
-            raise ExneatError(f"{key}.{name}: would call {child}; a configuration may not call code")
+        if name in ("_target_", "()") and key not in (".hydra.launcher", ".hydra.sweeper"):
+            raise ExneatError(f"{key[1:]}.{name}: would call {child}; a configuration may not call code")
         _refuse_calls(child, f"{key}.{name}")

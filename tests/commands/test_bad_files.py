@@ -123,11 +123,13 @@ def test_a_launcher_of_the_users_own_is_taken_unless_it_calls_something_else(
     (launchers / "sound.yaml").write_text(target)
     (launchers / "strange.yaml").write_text("_target_: os.mkdir\npath: called\n")
     (launchers / "nested.yaml").write_text(target + "verbose: {_target_: os.mkdir, path: called}\n")
-    (launchers / "logging.yaml").write_text("# @package hydra\njob_logging: {handlers: {x: {'()': os.mkdir}}}\n")
+    (launchers / "made.yaml").write_text(target + """verbose: "${oc.create:'{_target_: os.mkdir}'}"\n""")
+    (launchers / "logging.yaml").write_text(target + "x: {'()': os.mkdir}\n")
     train = ["train", "-m", "--config-dir", "mine", "task=track_maze", "algorithm=motionless", "budget=smoke"]
     monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
-    for name, named in {"strange": "Invalid plugin 'os.mkdir'", "nested": "call code", "logging": "call code"}.items():
-        check_refusal([*train, f"hydra/launcher={name}"], [named], tmp_path, capfd)
+    for name in ("nested", "made", "logging"):
+        check_refusal([*train, f"hydra/launcher={name}"], ["a configuration may not call code"], tmp_path, capfd)
+    check_refusal([*train, "hydra/launcher=strange"], ["Invalid plugin 'os.mkdir'"], tmp_path, capfd)
     assert main([*train, "hydra/launcher=sound"]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "outputs"]
 

@@ -28,7 +28,7 @@ SMALL = {
     },
     "conditions": {
         "gap_1": {"label": "gap of 1", "settings": {"task.gap": 1}, "sweeps": ["gap"]},
-        "clean": {"label": "clean", "settings": {}},
+        "clean": {"label": "clean", "settings": {}, "sweeps": None},
     },
     "runs": {"smoke": 1, "quick": 2},
 }

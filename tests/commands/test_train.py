@@ -254,7 +254,7 @@ def shown_settings(command: str) -> list[str]:
     lines = {
         "train": [
             "seed: 0 ",
-            "task=ant\n",
+            "# evolution=feed_forward\n",
             "  max_steps: 1000 ",
             "neat_hidden: 6 ",
             "  sensor_std: 0.0 ",
