@@ -11,6 +11,7 @@ import contextlib
 import fcntl
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,22 +22,15 @@ _heard: int | None = None
 _workplace: int | None = None
 
 
-def listen() -> dict[int, Any]:
-    """Raise KeyboardInterrupt upon the next Ctrl-C or SIGTERM; for the main thread. Returns the handlers of before."""
-    global _heard
-    _heard = None
-    return _set_handlers(dict.fromkeys(_SIGNALS, _hear))
-
-
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
-    """`listen` while inside; afterwards signals are handled as before."""
+    """Raise KeyboardInterrupt upon the first Ctrl-C or SIGTERM; for the main thread."""
     global _heard
-    before = listen()
+    before, hook = _set_handlers(dict.fromkeys(_SIGNALS, _hear)), sys.unraisablehook
     try:
         yield
     finally:
-        _heard = None
+        _heard, sys.unraisablehook = None, hook
         _set_handlers(before)
 
 
@@ -114,7 +108,7 @@ def as_worker(workplace: Path) -> Iterator[None]:
 
 def _hear(number: int, _: object) -> None:
     global _heard
-    _heard = number
+    _heard, sys.unraisablehook = number, _raise_again
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # whoever sends it to a whole group has a worker hear it twice
     if _workplace is not None:
@@ -123,6 +117,15 @@ def _hear(number: int, _: object) -> None:
                 os.kill(process, signal.SIGTERM)
         fcntl.flock(_workplace, fcntl.LOCK_EX)  # joblib kills its workers upon KeyboardInterrupt: let jobs end first
     raise KeyboardInterrupt
+
+
+def _raise_again(lost: sys.UnraisableHookArgs) -> None:
+    """Send the signal again where Python drops KeyboardInterrupt: in callbacks, such as one of the import system's."""
+    if _heard is None or not isinstance(lost.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(lost)
+        return
+    _set_handlers(dict.fromkeys(_SIGNALS, _hear))
+    threading.Timer(0.05, os.kill, (os.getpid(), _heard)).start()
 
 
 def _set_handlers(handlers: dict[int, Any]) -> dict[int, Any]:

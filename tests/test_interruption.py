@@ -16,7 +16,7 @@ from exneat_cli.main import main
 
 PRELUDE = """
 import os, pathlib, signal, subprocess, sys, time
-from exneat_cli.interruption import as_worker, launching, listen, signal_heard, uninterrupted
+from exneat_cli.interruption import as_worker, launching, listening, uninterrupted
 """
 
 
@@ -45,13 +45,13 @@ def test_a_signal_raises_keyboard_interrupt_and_is_known_afterwards(number: int)
 
 def test_a_second_ctrl_c_ends_the_process_at_once() -> None:
     done = in_process("""
-        listen()
-        try:
-            os.kill(os.getpid(), signal.SIGINT)
-        except KeyboardInterrupt:
-            print("first", flush=True)
-            os.kill(os.getpid(), signal.SIGINT)
-            print("never")
+        with listening():
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                print("first", flush=True)
+                os.kill(os.getpid(), signal.SIGINT)
+                print("never")
     """)
     assert (done.stdout, done.returncode) == ("first\n", -signal.SIGINT)
 
@@ -96,16 +96,31 @@ def test_signals_while_genomes_reproduce_crash_nothing() -> None:
         signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
         chance, heard = random.Random(0), 0
         for generation in range(1500):
-            listen()
             try:
-                signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 1e-3))
-                subpopulation.advance(dict.fromkeys(subpopulation.genomes, 0.0))
-                signal.setitimer(signal.ITIMER_REAL, 0)
+                with listening():
+                    signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 1e-3))
+                    subpopulation.advance(dict.fromkeys(subpopulation.genomes, 0.0))
+                    signal.setitimer(signal.ITIMER_REAL, 0)
             except KeyboardInterrupt:
                 heard += 1
         print(heard > 100)
     """)
     assert (done.stdout, done.stderr, done.returncode) == ("True\n", "", 0)
+
+
+def test_a_signal_in_a_callback_where_python_drops_exceptions_is_raised_after_it() -> None:
+    done = in_process("""
+        import weakref
+        thing = set()
+        watched = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGTERM) or time.sleep(60))
+        with listening():
+            try:
+                del thing
+                time.sleep(60)
+            except KeyboardInterrupt:
+                print("raised")
+    """)
+    assert (done.stdout, done.stderr) == ("raised\n", "")
 
 
 @pytest.mark.parametrize(
@@ -155,10 +170,9 @@ except KeyboardInterrupt:
         time.sleep(60)
 """
 LAUNCHER = f"""
-listen()
 place = pathlib.Path(sys.argv[1])
 try:
-    with launching(place):
+    with listening(), launching(place):
         worker = subprocess.Popen([sys.executable, "-c", {PRELUDE + WORKER!r}, place], stdout=subprocess.PIPE)
         worker.stdout.readline()
         SEND

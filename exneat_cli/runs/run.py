@@ -95,7 +95,7 @@ def train(
 
 def _save(directory: RunDirectory, training: Training) -> None:
     """Write down the generation that is done."""
-    if signal_heard() is not None:  # Python drops an exception that comes up in a callback of a weak reference
+    if signal_heard() is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
     write_history(directory.history, training.history)
     if training.is_over or len(training.history) % training.settings.checkpoint_every == 0:
