@@ -75,10 +75,9 @@ class Drifting(Task):
         return Simulation(np.zeros(3), **(COMPILED if self.compiled else PLAIN), compiled=self.compiled)
 
 
-def random_brains(count: int, task: Task | None = None) -> list[Brain]:
-    """Weighted sums of what is sensed, all different, for `Drifting` or another task."""
-    task, rng = task or Drifting(), np.random.default_rng(7)
-    shape = len(task.actuator_names), task.sensed_size
+def random_brains(count: int, task: Task = Drifting()) -> list[Brain]:
+    """Weighted sums of what is sensed, all different."""
+    shape, rng = (len(task.actuator_names), task.sensed_size), np.random.default_rng(7)
     return [weighted_sums(rng.normal(size=shape) / shape[1] ** 0.5, rng.normal(size=shape[0])) for _ in range(count)]
 
 
