@@ -29,8 +29,7 @@ from tests.torture.dask_workers import RESULTS, workers_of_this_process
 
 TWO = Executor("dask", 2)
 ANT = AntTask(max_steps=60)
-PLAIN = Drifting(compiled=False)
-"""Compiled code of our own would be compiled by every worker."""
+PLAIN = Drifting(compiled=False)  # every worker would have to compile it anew
 
 
 @pytest.fixture(scope="module", autouse=True)

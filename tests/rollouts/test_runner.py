@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brains, RandomActions, motionless
 from exneat_cli.brains.rules import weighted_sums
-from exneat_cli.compiling import compiled_lean
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import generator, training_episodes
 from exneat_cli.tasks import TrackMaze
-from tests.rollouts.drifting import EPISODES, PLAIN, SERIAL, Drifting, assert_equal, random_brains, run
+from tests.rollouts.drifting import COMPILED, EPISODES, PLAIN, SERIAL, Drifting, assert_equal, random_brains, run
 
 EXPLODING = weighted_sums(np.full((1, 3), math.nan), np.zeros(1))
 
@@ -98,14 +97,10 @@ def replace_functions(patch: pytest.MonkeyPatch, **functions: Any) -> None:
     patch.setattr(Drifting, "open", lambda task, training: replace(own(task, training=training), **functions))
 
 
-def push_back(point, action):  # type: ignore[no-untyped-def]
-    action[0] *= 0.5
-
-
 def test_a_loop_is_compiled_anew_once_a_function_of_ones_own_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = run(Drifting(), [motionless(3, np.ones(1))]).fitness
-    replace_functions(monkeypatch, drive=compiled_lean(push_back))
-    np.testing.assert_array_equal(np.sign(run(Drifting(), [motionless(3, np.ones(1))]).fitness), -np.sign(before))
+    before = run(Drifting(), random_brains(1)).fitness
+    replace_functions(monkeypatch, drive=COMPILED["locate"])  # goes as far as the point is from 0
+    assert (run(Drifting(), random_brains(1)).fitness != before).all()
 
 
 def test_a_world_without_sense_whose_task_needs_one_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
