@@ -33,7 +33,7 @@ check: $(VENV)/installed ## style, imports and types
 	$(BIN)/mypy
 
 tests: $(VENV)/installed ## tests alone
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 docs: $(VENV)/installed ## build the manual into docs/_build/html; a warning is an error
 	$(BIN)/sphinx-build -q -W --keep-going -n -b html docs docs/_build/html
