@@ -60,12 +60,10 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def launching(workplace: Path) -> Iterator[None]:
-    """For whoever starts workers: they do not hear the terminal's Ctrl-C, and a signal ends their jobs first.
-
-    Args:
-        workplace: a directory of this machine, which workers lock during a job.
-    """
+    """For whoever starts workers, whose jobs lock `workplace`: Ctrl-C is not for them, and a signal ends jobs first."""
     global _workplace
+    if _heard is not None:  # a library may have swallowed the exception
+        raise KeyboardInterrupt
     from multiprocessing import resource_tracker  # takes longer to import than --help to answer
 
     resource_tracker.ensure_running()  # its first start would unblock the signals
@@ -99,7 +97,10 @@ def as_worker(workplace: Path) -> Iterator[None]:
         with contextlib.suppress(FileNotFoundError):  # on another machine
             lock = os.open(workplace, os.O_RDONLY)
             ending.callback(os.close, lock)
-            fcntl.flock(lock, fcntl.LOCK_SH)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise KeyboardInterrupt from None  # the launcher was interrupted
         signal.signal(signal.SIGTERM, _hear)
         ending.callback(signal.pthread_sigmask, signal.SIG_BLOCK, {signal.SIGTERM})
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
@@ -121,11 +122,11 @@ def _hear(number: int, _: object) -> None:
 
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
     """Send the signal again where Python drops KeyboardInterrupt: in callbacks, such as one of the import system's."""
-    if _heard is None or not isinstance(lost.exc_value, KeyboardInterrupt):
+    if _heard is not None and isinstance(lost.exc_value, KeyboardInterrupt):
+        _set_handlers(dict.fromkeys(_SIGNALS, _hear))
+        threading.Timer(0.05, os.kill, (os.getpid(), _heard)).start()
+    else:
         sys.__unraisablehook__(lost)
-        return
-    _set_handlers(dict.fromkeys(_SIGNALS, _hear))
-    threading.Timer(0.05, os.kill, (os.getpid(), _heard)).start()
 
 
 def _set_handlers(handlers: dict[int, Any]) -> dict[int, Any]:

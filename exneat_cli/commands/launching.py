@@ -72,6 +72,8 @@ def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: 
 def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None, config: Mapping[str, int]) -> str:
     """Do one job, here or in a worker; return why it failed, for an error may not survive the way back."""
     job = jobs[config["job"]]
+    if signal_heard() is not None:  # a library may have swallowed the exception
+        raise KeyboardInterrupt
     try:
         with contextlib.nullcontext() if workplace is None else as_worker(workplace):
             work(job)

@@ -148,6 +148,8 @@ def _judge(
     left = len(program.left_over())
     files = len(list((program.temporary.parent / "out").rglob("*.tmp")))
     errors = program.errors.strip()
+    if left or files or seconds > BAR:
+        say(f"  {name}: {seconds:.1f} s, exit code {code}, {left} processes and {files} temporary files left")
     if code == 0:
         return _Stop(0.0 if not running else seconds, left, files, "done before")
     if code == -kind and "in program" not in errors and "exneat:" not in errors:
@@ -156,8 +158,6 @@ def _judge(
         mistakes.add(f"{name}: exit code {code}: {errors[-300:]}")
     elif "Traceback" in errors or not errors.splitlines() or "to resume" not in errors.splitlines()[-1]:
         mistakes.add(f"{name}: does not end in one line that says how to resume: {errors[-300:]}")
-    if left or files or seconds > BAR:
-        say(f"  {name}: {seconds:.1f} s, {left} processes and {files} temporary files left")
     return _Stop(seconds, left, files, "stopped", _unmarked(program.temporary.parent / "out"))
 
 
