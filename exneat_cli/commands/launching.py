@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 import sys
 import tempfile
 import traceback
@@ -47,7 +48,8 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
         with keep_clusters():  # starting one takes seconds
             return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
     with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
-        return _launch(functools.partial(_do, work, jobs, Path(workplace)), len(jobs), line, Path(workplace))
+        here = functools.partial(_do_here, Path.cwd(), functools.partial(_do, work, jobs, Path(workplace)))
+        return _launch(here, len(jobs), line, Path(workplace))
 
 
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
@@ -67,6 +69,12 @@ def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: 
             if signal_heard() is not None:
                 raise
             raise ExneatError(in_words(error, line.directories)) from error
+
+
+def _do_here(directory: Path, task: Callable[[Mapping[str, int]], str], config: Mapping[str, int]) -> str:
+    """Do one job in a worker; joblib keeps workers, which may have begun in another directory than this launch."""
+    os.chdir(directory)
+    return task(config)
 
 
 def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None, config: Mapping[str, int]) -> str:

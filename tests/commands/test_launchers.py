@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from exneat_cli.main import main
+
 PROGRAM = Path(sys.executable).parent / "exneat"
 
 
@@ -40,6 +42,18 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
     return subprocess.run(
         [PROGRAM, *arguments], capture_output=True, text=True, check=False, env={**os.environ, **environment}
     )
+
+
+def test_workers_that_joblib_kept_write_where_the_next_launch_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    train = ["train", "-m", "hydra/launcher=joblib", "task=track_maze", "algorithm=motionless", "budget=smoke"]
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        assert main([*train, "output=out"]) == 0
+        assert (tmp_path / name / "out").is_dir()
 
 
 def test_submitit_trains_the_same_and_says_why_a_job_failed(tmp_path: Path) -> None:
