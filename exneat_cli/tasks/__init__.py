@@ -9,7 +9,7 @@ from exneat_cli.tasks.grid.general_maze import GeneralMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.track_maze import TrackMaze
 from exneat_cli.tasks.grid.world import GridTask
-from exneat_cli.tasks.robots.ant import AntTask
+from exneat_cli.tasks.robots.robot import AntTask, RobotTask
 from exneat_cli.tasks.task import (
     ENDED,
     FAILED,
@@ -24,6 +24,7 @@ from exneat_cli.tasks.task import (
 
 TASKS: dict[str, type[Task]] = {
     "ant": AntTask,
+    "robot": RobotTask,
     "track_maze": TrackMaze,
     "general_maze": GeneralMaze,
     "foraging": Foraging,

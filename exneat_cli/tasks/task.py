@@ -29,12 +29,24 @@ class Part:
         sensors: entries of what brains sense that this part senses.
         actuators: entries of the action that move this part.
         position: (x, y) of the part seen from the trunk, x ahead and y to the left, in the task's length unit.
+        height: of the part above the trunk's origin, in the same unit.
+        likeness: number of the class of parts that are built alike; -1 where nobody compared them.
+        is_mirrored: whether it is a mirrored one of the first part of its class.
+        joints: those of its sensors that are positions and velocities of its joints.
+        mirrored_joints: the entries that mirrored parts read instead.
+        trunk: entries of the trunk as seen from this part.
     """
 
     name: str
     sensors: tuple[int, ...]
     actuators: tuple[int, ...]
     position: tuple[float, float]
+    height: float = 0.0
+    likeness: int = -1
+    is_mirrored: bool = False
+    joints: tuple[int, ...] = ()
+    mirrored_joints: tuple[int, ...] = ()
+    trunk: tuple[int, ...] = ()
 
 
 @compiled_lean

@@ -1,9 +1,9 @@
 """The trunk and the parts of a MuJoCo body, which parts are alike, and the frame in which each of them senses.
 
-Two parts are alike if one becomes the other by a shift along the trunk, by a turn about the trunk's vertical axis where
-three or more such parts stand evenly around it, or by mirroring left and right. Parts that are alike may share a network:
-Valsalam and Miikkulainen, "Evolving symmetry for modular system design", 2011, found that symmetric legs are learned
-faster on flat ground; Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024.
+Two parts are alike if one becomes the other by a shift along the trunk, by a turn about the trunk's vertical axis
+where three or more such parts stand evenly around it, or by mirroring left and right. Parts that are alike may share
+a network: Valsalam and Miikkulainen, "Evolving symmetry for modular system design", 2011, found that symmetric legs
+are learned faster on flat ground; Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024.
 """
 
 from __future__ import annotations
@@ -62,23 +62,29 @@ def take_apart(
     order: str = "position",
     symmetry: str | None = None,
     parts: Mapping[str, Sequence[str]] | None = None,
+    by_place: bool = False,
 ) -> Body:
     """Find the trunk and the parts of a robot.
 
     Args:
         model: of the robot.
         order: ``position``: from front to back, left before right; ``model``: as the model numbers their bodies.
-        symmetry: ``turn`` or ``mirror``, what relates parts that no shift relates; None takes mirrorings where there are any.
+        symmetry: ``turn`` or ``mirror``, what relates parts that no shift relates; None takes mirrorings where there
+            are any.
         parts: names of each part's bodies, each of which brings along all that hangs on it; None finds the parts.
+        by_place: call parts by where they stand, though their first bodies have names of their own.
 
     Raises:
         ConfigError: the model has no root, no actuators or ones of another kind than joints', or `parts` do not fit it.
     """
     trunk, root = find_root(model)
     pose = Pose(model, trunk)
-    named = _named_parts(model, trunk, parts) if parts else {tuple(subtree(model, b)): "" for b in _outermost(pose, trunk)}
+    named = (
+        _named_parts(model, trunk, parts) if parts else {tuple(subtree(model, b)): "" for b in _outermost(pose, trunk)}
+    )
     bodies = sorted(named, key=lambda part: _from_front_to_back(pose, part) if order == "position" else part)
-    names = _unique_names([named[part] or model.body(part[0]).name for part in bodies], pose, bodies)
+    names = [named[part] or ("" if by_place else model.body(part[0]).name) for part in bodies]
+    names = _unique_names(names, pose, bodies)
     turns = {(a, b): r for a in bodies for b in bodies if (r := _turn(pose, a, b, bodies))}
     mirrorings = {(a, b): r for a in bodies for b in bodies if a != b and (r := relate(pose, "mirror", MIRROR, a, b))}
     moves = turns if symmetry == "turn" or not mirrorings else {}
@@ -86,15 +92,14 @@ def take_apart(
     references: list[tuple[int, ...]] = []
     for name, part in zip(names, bodies, strict=True):
         x, y, z = (float(each) for each in pose.place(part))
-        for likeness, first in enumerate(references):
-            relation = relate(pose, "shift", np.eye(3), first, part) or moves.get((first, part)) or mirrorings.get((first, part))
-            if relation:
-                break
-        else:
-            likeness = len(references)
+        ways = [
+            relate(pose, "shift", np.eye(3), first, part) or moves.get((first, part)) or mirrorings.get((first, part))
+            for first in references
+        ]
+        likeness = next((k for k, relation in enumerate(ways) if relation), len(references))
+        if likeness == len(references):
             references.append(part)
-            relation = _itself(pose, part)
-        limbs.append(Limb(name, likeness, relation, (x, y, z)))
+        limbs.append(Limb(name, likeness, [*ways, None][likeness] or _itself(pose, part), (x, y, z)))
     in_parts = {body for part in bodies for body in part}
     core = tuple(body for body in subtree(model, trunk) if body not in in_parts)
     there = tuple(name for name, found in zip(SYMMETRIES, (turns, mirrorings), strict=True) if found)
@@ -112,7 +117,9 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
     for actuator in range(model.nu):
         if model.actuator_trntype[actuator] not in _JOINT_ACTUATORS:
             kind = mujoco.mjtTrn(model.actuator_trntype[actuator]).name.removeprefix("mjTRN_").lower()
-            raise ConfigError("task.model", "actuators that drive joints", f"{_label(model, actuator)}, which drives a {kind}")
+            raise ConfigError(
+                "task.model", "actuators that drive joints", f"{_label(model, actuator)}, which drives a {kind}"
+            )
     driven = set(model.actuator_trnid[:, 0].tolist())
     found = []
     for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
@@ -138,7 +145,7 @@ def subtree(model: mujoco.MjModel, root: int) -> list[int]:
 
 
 def _outermost(pose: Pose, trunk: int) -> list[int]:
-    """The first bodies of the parts: the trunk goes on as long as two or more driven subtrees hang on its middle plane."""
+    """The first bodies of the parts: the trunk goes on while two or more driven subtrees hang on its middle plane."""
     model = pose.model
     driven = {int(model.jnt_bodyid[joint]) for joint in model.actuator_trnid[:, 0]}
 
@@ -162,11 +169,10 @@ def _outermost(pose: Pose, trunk: int) -> list[int]:
     return outermost
 
 
-def _named_parts(
-    model: mujoco.MjModel, trunk: int, parts: Mapping[str, Sequence[str]]
-) -> dict[tuple[int, ...], str]:
+def _named_parts(model: mujoco.MjModel, trunk: int, parts: Mapping[str, Sequence[str]]) -> dict[tuple[int, ...], str]:
     known = {model.body(body).name: body for body in subtree(model, trunk)[1:]}
-    named, taken = {}, {}
+    named: dict[tuple[int, ...], str] = {}
+    taken: dict[int, str] = {}
     for name, roots in parts.items():
         bodies: list[int] = []
         for root in roots:
@@ -176,7 +182,9 @@ def _named_parts(
         for body in bodies:
             if body in taken:
                 both = f"{model.body(body).name} in {taken[body]} and {name}"
-                raise ConfigError("task.parts", "parts that do not overlap", both, "a body brings along all that hangs on it")
+                raise ConfigError(
+                    "task.parts", "parts that do not overlap", both, "a body brings along all that hangs on it"
+                )
             taken[body] = name
         named[tuple(bodies)] = name
     return named
@@ -203,7 +211,9 @@ def place_in_words(pose: Pose, part: Sequence[int]) -> str:
     return "_".join(filter(None, (ahead, aside))) or "middle"
 
 
-def _turn(pose: Pose, one: tuple[int, ...], other: tuple[int, ...], parts: Sequence[tuple[int, ...]]) -> Relation | None:
+def _turn(
+    pose: Pose, one: tuple[int, ...], other: tuple[int, ...], parts: Sequence[tuple[int, ...]]
+) -> Relation | None:
     """What turns a part into another, if they and all others that a turn makes of it stand evenly around the trunk."""
     related = {part: r for part in parts if (r := _turned(pose, one, part))}
     if len(related) < 3 or one == other or other not in related:

@@ -1,6 +1,6 @@
 """Whether one part of a MuJoCo body becomes another one by a shift, a turn or a mirroring, and with which signs.
 
-A hinge's axis is a pseudovector: mirroring left and right reverses hinges about x and z, and leaves those about y alone.
+A hinge's axis is a pseudovector: mirroring left and right reverses hinges about x and z, but not those about y.
 A joint's sign makes its axis what the move makes of the other part's; ranges and actuators go with it.
 """
 
@@ -21,8 +21,11 @@ Gymnasium's Humanoid do differ a little."""
 _ROUND_OFF = 1e-6
 """Relative tolerance of what must be equal: ranges, gears, sizes, friction."""
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-_SPHERE, _ROUND = int(mujoco.mjtGeom.mjGEOM_SPHERE), (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
-_SHAPED_AXES = {_SPHERE: [], **dict.fromkeys(_ROUND, [2])}
+_SPHERE, _ROUND = (
+    int(mujoco.mjtGeom.mjGEOM_SPHERE),
+    (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)),
+)
+_SHAPED_AXES = {_SPHERE: [], **{kind: [2] for kind in _ROUND}}
 """Which of a geom's axes its shape shows; all three for shapes not named here."""
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Exchanges left and right."""
@@ -33,7 +36,7 @@ class Relation(NamedTuple):
 
     Attributes:
         name: ``itself``, ``shift``, ``turn`` or ``mirror``.
-        move: (3, 3) orthogonal: what it does to vectors in the trunk's axes, and to pseudovectors but for its determinant.
+        move: (3, 3) orthogonal: what it does to vectors in the trunk's axes.
         bodies: their numbers in the model; so below.
         joints: hinges and slides.
         joint_signs: 1 or -1 for each.
@@ -58,6 +61,7 @@ class Pose:
         mujoco.mj_forward(model, data)
         origin, axes = data.xpos[trunk], data.xmat[trunk].reshape(3, 3)
         self.model = model
+        self.height = float(origin[2])
         self.tolerance = _PLACES * float(model.stat.extent)
         self.bodies = (data.xpos - origin) @ axes
         self.anchors = (data.xanchor - origin) @ axes
@@ -85,7 +89,9 @@ class Pose:
         return np.asarray(self.anchors[joints[0]] if joints else self.bodies[part[0]])
 
 
-def relate(pose: Pose, name: str, move: NDArray[np.float64], one: Sequence[int], other: Sequence[int]) -> Relation | None:
+def relate(
+    pose: Pose, name: str, move: NDArray[np.float64], one: Sequence[int], other: Sequence[int]
+) -> Relation | None:
     """Compare two parts after a move, which a shift along x may follow unless it is a turn; None if they are not alike.
 
     Args:
@@ -214,5 +220,5 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def _close(values: NDArray[np.float64], one: int, other: int) -> bool:
-    """Whether two entries differ little beside the largest one of all: where joints have a stiffness of 20, 0 and 1 are alike."""
+    """Whether two entries differ little beside the largest of all: among stiffnesses up to 20, 0 and 1 are alike."""
     return bool(abs(values[one] - values[other]) <= _SHARE * np.abs(values).max() + 1e-12)
