@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
+import yaml
 from msgspec import Meta
 
 from exneat_cli.errors import ExneatError, check_keys, check_section, shortened
@@ -24,6 +25,24 @@ _Kind = TypeVar("_Kind")
 _NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text"}
 _NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
 """Ours for msgspec's types."""
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read keys with values; nothing in the file is run.
+
+    Raises:
+        ExneatError: the file is missing, unreadable, no YAML, or holds something else.
+    """
+    try:
+        content = yaml.safe_load(read_text(path))
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{path}:{mark.line + 1}" if mark else str(path)
+        problem = getattr(error, "problem", None) or " ".join(str(error).split())
+        raise ExneatError(f"{place}: expected YAML, got something else: {problem}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected keys with values, got {type(content).__name__}")
+    return content
 
 
 def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:

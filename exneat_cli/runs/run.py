@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-import msgspec
 import yaml
 
 from exneat_cli.errors import ExneatError
@@ -28,9 +27,8 @@ from exneat_cli.records import (
     write_history,
 )
 from exneat_cli.rollouts import Runner, keep_clusters
-from exneat_cli.runs.champion import choose_champion, measure_baseline
 from exneat_cli.runs.progress import Progress
-from exneat_cli.runs.scores import summary_sentence
+from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
@@ -38,14 +36,7 @@ from exneat_cli.seeding import STREAMS
 
 @dataclass(frozen=True)
 class Finished:
-    """A run that is done.
-
-    Attributes:
-        directory: where its files are.
-        result: test figures of champion, standing still and first generation; see the manifest.
-        summary: the same in one sentence.
-        trained_now: False if it was found finished.
-    """
+    """A run that is done: its figures, the same in one sentence, and whether it was trained now or found finished."""
 
     directory: RunDirectory
     result: Result
@@ -60,7 +51,7 @@ def train(
     """Do one run, or find it done.
 
     Args:
-        settings: see there.
+        settings: of the run.
         progress: told what happens; nothing is shown without it.
         command: the command line that asked for it, for the manifest.
         go_on: go on with an unfinished run also without `settings.resume`, which alone makes a finished one longer.
@@ -72,8 +63,8 @@ def train(
     progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
-    resume, lengthen = settings.resume or go_on, settings.resume
-    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as was_done:
+    resume = settings.resume or go_on
+    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=settings.resume) as was_done:
         if not was_done:
             with _recorded(directory, settings, progress, command):
                 if settings.algorithm.rule:
@@ -108,13 +99,11 @@ def _recorded(
 ) -> Iterator[None]:
     """Keep the manifest: how the run began, and how it ended if that is before its result."""
     before = directory.read_manifest() if directory.is_there() else None
-    manifest = _first_manifest(settings, command)
     if before:
         _tell_other_versions(before, progress)
-        manifest = msgspec.structs.replace(manifest, started=before.started, resumed=(*before.resumed, _now()))
         directory.forget_what_was_derived()
     try:
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), _manifest(settings, command, before))
         progress.start(directory.path.name, settings.generations)
         yield
     except (Exception, KeyboardInterrupt) as error:
@@ -143,7 +132,8 @@ def _tell_other_versions(before: Manifest, progress: Progress) -> None:
         progress.say(f"{names}: results may differ from those of an undisturbed run")
 
 
-def _first_manifest(settings: RunSettings, command: Sequence[str]) -> Manifest:
+def _manifest(settings: RunSettings, command: Sequence[str], before: Manifest | None) -> Manifest:
+    """That of a run that begins now, or goes on where the one `before` ended."""
     return Manifest(
         format=MANIFEST_FORMAT,
         status=RUNNING,
@@ -154,7 +144,8 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> Manifest:
         configuration_hash=settings.full_hash,
         generations=settings.trained_generations,
         command=tuple(command),
-        started=_now(),
+        started=before.started if before else _now(),
+        resumed=(*before.resumed, _now()) if before else (),
         seeds={"root": settings.seed, "streams": STREAMS},
         versions=provenance.versions(),
         processor=provenance.processor(),
