@@ -31,12 +31,9 @@ _STATE, _DIGEST_SIZE = "state", hashlib.sha256().digest_size
 
 
 def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str) -> None:
-    """Write a checkpoint, and delete those that are no longer needed.
+    """Write a checkpoint of the run with this hash, and delete those that are no longer needed.
 
-    Args:
-        directory: of the run.
-        checkpoint: its plain part says under ``generation`` how many generations are done.
-        configuration_hash: of the run; a checkpoint of another one is refused.
+    The plain part says under ``generation`` how many generations are done.
 
     Raises:
         ExneatError: the file cannot be written; the older ones are still there then.

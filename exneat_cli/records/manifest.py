@@ -16,10 +16,7 @@ INTERRUPTED: Final = "interrupted"
 
 
 class Score(Struct, frozen=True, forbid_unknown_fields=True):
-    """Means and standard deviations (population, over episodes) of one brain; failed episodes have the failure floor.
-
-    `fitness` is that of each episode, in the order of the shared ones.
-    """
+    """Means and standard deviations (population, over episodes) of one brain, and its fitness in each of them."""
 
     episodes: Annotated[int, Meta(ge=1)]
     fitness_mean: Real

@@ -32,9 +32,7 @@ _TRIES, _PAUSE = 3, 0.02
 def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
     """SHA-256, in hex, of the settings that results depend on, but for the number of generations.
 
-    Args:
-        configuration: all settings of a run, as plain data.
-        with_seed: without it, the seeds of one variant share a hash.
+    Without the seed, all runs of one variant share a hash.
     """
     kept = {key: value for key, value in _identity(configuration).items() if with_seed or key != "seed"}
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
@@ -88,10 +86,10 @@ class RunDirectory:
         """Hold the directory, made if need be, against other processes; yields whether the run is finished already.
 
         Args:
-            full_hash: of the run, see `configuration_hash`.
+            full_hash: the run's `configuration_hash`.
             configuration: all its settings, as plain data.
-            resume: whether to go on with an unfinished run.
-            lengthen: whether to make a finished one longer.
+            resume: whether an unfinished run may be gone on with.
+            lengthen: whether a finished one may be made longer.
 
         Raises:
             ExneatError: the directory cannot be made or used, or holds something else than this run.

@@ -40,8 +40,7 @@ class Progress:
     def generation(self, row: HistoryRow) -> None:
         """Move the bar; or print every tenth part of the run, and the last generation."""
         number = row["generation"]
-        best, mean, best_so_far = row["best_fitness"], row["mean_fitness"], row["best_so_far"]
-        figures = f"best {best:.4g}  mean {mean:.4g}  best so far {best_so_far:.4g}"
+        figures = "best {best_fitness:.4g}  mean {mean_fitness:.4g}  best so far {best_so_far:.4g}".format_map(row)
         if self._bar:
             self._bar.update(self._task, completed=number, figures=figures)
         elif number % max(1, self._generations // 10) == 0 or number == self._generations:

@@ -42,9 +42,8 @@ def load_settings(directory: RunDirectory) -> RunSettings:
 def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> bool:
     """Whether the run of these settings is done and was tested at every level of `sweeps`."""
     directory = settings.directory
-    if not directory.is_finished(settings.full_hash, settings.trained_generations):
-        return False
-    return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
+    is_trained = directory.is_finished(settings.full_hash, settings.trained_generations)
+    return is_trained and not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
 
 
 def missing_levels(directory: RunDirectory, sweep: Sweep, episodes: int) -> tuple[float, ...]:
@@ -120,13 +119,12 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
 
 
 def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | RandomActions:
-    rule = settings.algorithm.rule
-    if rule is None:
-        champion = read_champion(directory.champion)
-        if champion.variant != settings.variant:
-            variants = f"expected a champion of {settings.variant}, got {champion.variant}"
-            raise ExneatError(f"{directory.champion}: {variants}")
-        if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
-            raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
-        return champion.brain()
-    return acting_by_rule(rule, settings.task)
+    if settings.algorithm.rule is not None:
+        return acting_by_rule(settings.algorithm.rule, settings.task)
+    champion = read_champion(directory.champion)
+    if champion.variant != settings.variant:
+        variants = f"expected a champion of {settings.variant}, got {champion.variant}"
+        raise ExneatError(f"{directory.champion}: {variants}")
+    if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
+        raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
+    return champion.brain()

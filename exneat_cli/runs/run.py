@@ -48,13 +48,9 @@ class Finished:
 def train(
     settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
-    """Do one run, or find it done.
+    """Do one run, or find it done; nothing is shown without `progress`, and `command` is for the manifest.
 
-    Args:
-        settings: of the run.
-        progress: told what happens; nothing is shown without it.
-        command: the command line that asked for it, for the manifest.
-        go_on: go on with an unfinished run also without `settings.resume`, which alone makes a finished one longer.
+    An unfinished run is gone on with if `go_on` or `settings.resume`, which alone makes a finished one longer.
 
     Raises:
         ExneatError: the directory is unusable or holds something else, or no team survived.
@@ -70,9 +66,8 @@ def train(
                 if settings.algorithm.rule:
                     result = measure_baseline(settings, directory)
                 else:
-                    training = Training.resumed(
-                        settings, read_checkpoints(directory.path, settings.full_hash), progress.say
-                    )
+                    checkpoints = read_checkpoints(directory.path, settings.full_hash)
+                    training = Training.resumed(settings, checkpoints, progress.say)
                     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
                         while not training.is_over:
                             training.advance(runner)
@@ -99,11 +94,12 @@ def _recorded(
 ) -> Iterator[None]:
     """Keep the manifest: how the run began, and how it ended if that is before its result."""
     before = directory.read_manifest() if directory.is_there() else None
+    manifest = _manifest(settings, command, before)
     if before:
         _tell_other_versions(before, progress)
         directory.forget_what_was_derived()
     try:
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), _manifest(settings, command, before))
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
         progress.start(directory.path.name, settings.generations)
         yield
     except (Exception, KeyboardInterrupt) as error:
@@ -115,21 +111,17 @@ def _recorded(
 
 def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
     interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    ended = {"status": INTERRUPTED} if interrupted else {"status": FAILED, "error": f"{type(error).__name__}: {error}"}
     with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-        if not directory.is_there() or directory.read_manifest().status != RUNNING:
-            return
-        if interrupted:
-            directory.update_manifest(status=INTERRUPTED)
-        else:
-            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+        if directory.is_there() and directory.read_manifest().status == RUNNING:
+            directory.update_manifest(**ended)
 
 
 def _tell_other_versions(before: Manifest, progress: Progress) -> None:
     now, then = provenance.versions(), before.versions
-    changed = [name for name in now if then.get(name) != now[name]]
+    changed = [f"{name} {then.get(name)} then, {now[name]} now" for name in now if then.get(name) != now[name]]
     if changed:
-        names = ", ".join(f"{name} {then.get(name)} then, {now[name]} now" for name in changed)
-        progress.say(f"{names}: results may differ from those of an undisturbed run")
+        progress.say(f"{', '.join(changed)}: results may differ from those of an undisturbed run")
 
 
 def _manifest(settings: RunSettings, command: Sequence[str], before: Manifest | None) -> Manifest:

@@ -24,12 +24,9 @@ _FIRST = "first_generation"
 
 @dataclass
 class Training:
-    """A training between two generations; `advance` does the next one.
+    """A training between two generations, with a row of history for each that is done; `advance` does the next one.
 
     Attributes:
-        settings: of the run.
-        search: the algorithm at work.
-        history: one row per generation that is done.
         first_generation: the best team of the first generation, which is random; None before it.
         began: clock time (s) at which an undisturbed training would have begun.
     """
@@ -49,10 +46,7 @@ class Training:
     def resumed(cls, settings: RunSettings, checkpoints: Iterable[State | str], say: Callable[[str], None]) -> Training:
         """Go on from the first checkpoint that is sound, else begin; the results are the same.
 
-        Args:
-            settings: of the run.
-            checkpoints: the newest first, with a line in place of each that cannot be read.
-            say: told what it goes on from.
+        The newest checkpoint comes first; a line, which is said, stands in place of each that cannot be read.
         """
         for checkpoint in checkpoints:
             if isinstance(checkpoint, str):
