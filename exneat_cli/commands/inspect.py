@@ -8,7 +8,7 @@ from pathlib import Path
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
-from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, is_held, read_champion
+from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
 from exneat_cli.wiring import Module
 
 
@@ -93,7 +93,7 @@ def _list(output: Path) -> None:
 
 def _status(run: RunDirectory, manifest: Manifest) -> str:
     """The manifest's status; a killed process cannot write its own."""
-    return "killed" if manifest.status == RUNNING and not is_held(run.path) else manifest.status
+    return "killed" if manifest.status == RUNNING and not run.is_held() else manifest.status
 
 
 def _ranges(indices: Sequence[int]) -> str:

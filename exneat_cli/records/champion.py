@@ -88,17 +88,7 @@ class Scores(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 
 
 class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The team that a run hands over.
-
-    Attributes:
-        variant: what was trained, e.g. ``exneat-all-none``.
-        task: the task's parameters.
-        actuators: names of the entries of the action.
-        feed_forward: the kind of networks; else recurrent ones.
-        scores: in training, validation and test.
-        plan: who senses and drives what.
-        genomes: one per subpopulation.
-    """
+    """The team that a run hands over: all that is needed to run it, one genome per subpopulation."""
 
     format: int = CHAMPION_FORMAT
     variant: Word
@@ -153,12 +143,7 @@ def _check(champion: Champion) -> None:
 
 
 def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[float]) -> None:
-    """Write one line per team, best on validation first.
-
-    Args:
-        path: of the file.
-        entries: the teams.
-        validation: mean fitness of each on the validation episodes.
+    """Write one line per team, the best in `validation`, mean fitness of each on those episodes, first.
 
     Raises:
         ExneatError: the file cannot be written.

@@ -13,11 +13,12 @@ import re
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exneat_cli.algorithms import State
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, read_bytes, write_whole
 
@@ -29,40 +30,23 @@ _NAME = re.compile(r"checkpoint-(\d{6,9})\.npz")
 _STATE, _DIGEST_SIZE = "state", hashlib.sha256().digest_size
 
 
-class Checkpoint(NamedTuple):
-    """What a run goes on from.
+def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str) -> None:
+    """Write a checkpoint of the run with this hash, and delete those that are no longer needed.
 
-    Attributes:
-        generation: how many generations are done.
-        plain: numbers, strings, lists and dicts.
-        arrays: columns of numbers by name.
-    """
-
-    generation: int
-    plain: dict[str, Any]
-    arrays: dict[str, NDArray[Any]]
-
-
-def write_checkpoint(directory: Path, checkpoint: Checkpoint, configuration_hash: str) -> None:
-    """Write a checkpoint, and delete those that are no longer needed.
-
-    Args:
-        directory: of the run.
-        checkpoint: what to write.
-        configuration_hash: of the run; a checkpoint of another one is refused.
+    The plain part says under ``generation`` how many generations are done.
 
     Raises:
         ExneatError: the file cannot be written; the older ones are still there then.
         ValueError: a number is not finite.
     """
-    head = {"format": FORMAT, "configuration_hash": configuration_hash, "generation": checkpoint.generation}
-    state = {**head, **checkpoint.plain}
-    buffer = io.BytesIO()
+    newest = checkpoint.plain["generation"]
+    state = {"format": FORMAT, "configuration_hash": configuration_hash, **checkpoint.plain}
     text = np.frombuffer(json.dumps(state, allow_nan=False).encode(), np.uint8)
+    buffer = io.BytesIO()
     np.savez(buffer, **checkpoint.arrays, **{_STATE: text})  # type: ignore[arg-type]
-    write_whole(directory / f"checkpoint-{checkpoint.generation:06d}.npz", with_digest(buffer.getvalue()))
+    write_whole(directory / f"checkpoint-{newest:06d}.npz", with_digest(buffer.getvalue()))
     # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
-    kept = [path for path, generation in _found(directory) if generation <= checkpoint.generation][:KEPT]
+    kept = [path for path, generation in _found(directory) if generation <= newest][:KEPT]
     for path, _ in _found(directory):
         if path not in kept:
             delete(path)
@@ -73,16 +57,11 @@ def with_digest(archive: bytes) -> bytes:
     return archive + hashlib.sha256(archive).digest()
 
 
-def read_checkpoints(directory: Path, configuration_hash: str) -> Iterator[Checkpoint | str]:
-    """Every checkpoint of a run, the newest first; in place of a damaged one, a line that says what is wrong.
-
-    Args:
-        directory: of the run.
-        configuration_hash: of the run.
-    """
+def read_checkpoints(directory: Path, configuration_hash: str) -> Iterator[State | str]:
+    """Every checkpoint of a run, as it was written, the newest first; in place of a damaged one, what is wrong."""
     for path, generation in _found(directory):
         try:
-            yield _read(path, generation, configuration_hash)
+            yield _read(path, {"format": FORMAT, "configuration_hash": configuration_hash, "generation": generation})
         except ExneatError as error:
             yield str(error)
 
@@ -93,18 +72,18 @@ def _found(directory: Path) -> list[tuple[Path, int]]:
     return sorted(found, key=lambda pair: -pair[1])
 
 
-def _read(path: Path, generation: int, configuration_hash: str) -> Checkpoint:
+def _read(path: Path, head: dict[str, Any]) -> State:
+    """A checkpoint whose plain part must begin with `head`."""
     data = read_bytes(path, _LARGEST)
     try:
         arrays = _arrays(data)
         plain = dict(json.loads(arrays.pop(_STATE).tobytes()))
     except Exception as error:  # NumPy's and the ZIP reader's errors on bytes of any kind are of every class
         raise ExneatError(f"{path}: damaged: {error or type(error).__name__}") from error
-    head = {"format": FORMAT, "configuration_hash": configuration_hash, "generation": generation}
     for key, expected in head.items():
         if plain.pop(key, None) != expected:
             raise ExneatError(f"{path}: its {key} is not {expected}: it belongs to another run or version")
-    return Checkpoint(generation, plain, arrays)
+    return State({"generation": head["generation"], **plain}, arrays)
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import json
 import os
 import stat
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -67,19 +64,6 @@ def write_json(path: Path, content: object) -> None:
     """
     text = json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False, ensure_ascii=False)
     write_whole(path, f"{text}\n".encode(errors="replace"))  # an argument of the command line may be no UTF-8
-
-
-def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a table; floats keep every digit, so equal numbers are equal bytes.
-
-    Raises:
-        ExneatError: the file cannot be written.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([repr(float(v)) if isinstance(v, float) else v for v in row] for row in rows)
-    write_whole(path, text.getvalue())
 
 
 def read_text(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""manifest.json: how a run began, how it ended, and with what result."""
+"""manifest.json: how a run began and ended, and with what result; docs/run-directory.md says what each field holds."""
 
 from __future__ import annotations
 
@@ -16,15 +16,7 @@ INTERRUPTED: Final = "interrupted"
 
 
 class Score(Struct, frozen=True, forbid_unknown_fields=True):
-    """Means and standard deviations (population, over episodes) of one brain.
-
-    Attributes:
-        episodes: how many were run.
-        fitness_mean, fitness_std: of the task's fitness.
-        full_reward_mean, full_reward_std: of the task's second figure.
-        failed_episodes: how many failed; those count with the failure floor.
-        fitness: of each episode, in the order of the shared episodes.
-    """
+    """Means and standard deviations (population, over episodes) of one brain, and its fitness in each of them."""
 
     episodes: Annotated[int, Meta(ge=1)]
     fitness_mean: Real
@@ -42,8 +34,7 @@ class Result(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
         training: best fitness of all generations.
         validation: mean fitness of the champion on the validation episodes.
         champion: on the test episodes; of a baseline, the baseline itself.
-        standing_still: an agent that does nothing, on the same episodes.
-        first_generation: the best team of the first generation, likewise.
+        standing_still, first_generation: likewise, of an agent that does nothing, and of the best random team.
     """
 
     training: Real | None = None
@@ -56,22 +47,8 @@ class Result(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 class Manifest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What manifest.json holds.
 
-    Attributes:
-        format: of the run directory.
-        status: `RUNNING`, `DONE`, `FAILED` or `INTERRUPTED`; a killed process leaves the first.
-        process: id of the one that writes it.
-        variant, task, seed: what is trained.
-        configuration_hash: of all settings that results depend on, but for the generations.
-        generations: how long it is trained; 0 for a baseline.
-        command: the command line.
-        started, finished: times (UTC); `resumed` are those at which the run went on.
-        seeds: the root of its random streams, and their names.
-        versions: of exneat, Python and libraries.
-        processor, cores, git_commit: of the machine and the checkout, as far as they are known.
-        budget_spent: training episodes, control steps and seconds.
-        failed_robustness_episodes: how many failed, by level; none where nothing did.
-        result: of a finished run.
-        error: why it failed.
+    A killed process leaves the status `RUNNING`. A baseline is trained for 0 generations. Times are in UTC, `resumed`
+    are those at which the run went on. A `result` is there if the run is done.
     """
 
     format: int

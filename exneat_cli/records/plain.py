@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
+import yaml
 from msgspec import Meta
 
 from exneat_cli.errors import ExneatError, check_keys, check_section, shortened
@@ -26,13 +27,26 @@ _NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
 """Ours for msgspec's types."""
 
 
-def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
-    """Read a JSON object that has a field ``format``; returns it typed, and as it was.
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read keys with values; nothing in the file is run.
 
-    Args:
-        path: of the file.
-        kind: a `msgspec.Struct`.
-        version: the format that this version of exneat reads.
+    Raises:
+        ExneatError: the file is missing, unreadable, no YAML, or holds something else.
+    """
+    try:
+        content = yaml.safe_load(read_text(path))
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{path}:{mark.line + 1}" if mark else str(path)
+        problem = getattr(error, "problem", None) or " ".join(str(error).split())
+        raise ExneatError(f"{place}: expected YAML, got something else: {problem}") from error
+    if not isinstance(content, dict):
+        raise ExneatError(f"{path}: expected keys with values, got {type(content).__name__}")
+    return content
+
+
+def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
+    """Read a JSON object whose field ``format`` is `version`; returns it as the struct `kind`, and as it was.
 
     Raises:
         ExneatError: the file is missing, unreadable, no JSON object or of another format, or a field is missing,
@@ -56,14 +70,10 @@ def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[
 def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = True) -> _Kind:
     """Plain data as `kind`, which is whatever `msgspec.convert` knows.
 
-    Args:
-        content: from a file.
-        kind: what it should be.
-        where: begins the message.
-        strict: without it, text that reads as a number is one, as in CSV files.
+    If not `strict`, text that reads as a number is one, as in CSV files.
 
     Raises:
-        ExneatError: it does not fit; names the field, what was expected and what came.
+        ExneatError: it does not fit; names what is wrong: `where`, the field, what was expected and what came.
     """
     try:
         return msgspec.convert(content, kind, strict=strict)
@@ -82,10 +92,7 @@ def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = Tru
 def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
     """Make a dataclass of plain data; fields that are dataclasses, or tuples of them, are made of theirs.
 
-    Args:
-        kind: the dataclass; it checks its own values.
-        values: a mapping by field; what is a dataclass already stays as it is.
-        prefix: of the keys in messages, e.g. ``noise.``.
+    What is a dataclass already stays as it is. `prefix` is that of the keys in messages, e.g. ``noise.``.
 
     Raises:
         ConfigError: `values` is no mapping, or whatever `kind` says of them.

@@ -1,11 +1,14 @@
-"""The directory of one run: its name, its files, and whether a run may use it."""
+"""The directory of one run: its files, its one writer, and whether a run may use it."""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import json
+import os
 import shutil
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from glob import glob
@@ -16,22 +19,20 @@ import msgspec
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
-from exneat_cli.records.locks import held
 from exneat_cli.records.manifest import DONE, MANIFEST_FORMAT, Manifest, Result
-from exneat_cli.records.plain import read_json
-from exneat_cli.records.yaml_files import read_yaml
+from exneat_cli.records.plain import read_json, read_yaml
 
 _NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
+_TRIES, _PAUSE = 3, 0.02
+"""How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
 
 
 def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
     """SHA-256, in hex, of the settings that results depend on, but for the number of generations.
 
-    Args:
-        configuration: all settings of a run, as plain data.
-        with_seed: without it, the seeds of one variant share a hash.
+    Without the seed, all runs of one variant share a hash.
     """
     kept = {key: value for key, value in _identity(configuration).items() if with_seed or key != "seed"}
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
@@ -59,19 +60,10 @@ def _shortest(text: str) -> int | float:
 
 @dataclass(unsafe_hash=True)
 class RunDirectory:
-    """Where one run keeps its files; docs/run-directory.md says what each of them holds.
+    """``<output>/<name>/<variant>-s<seed>-<hash>``, where one run keeps its files.
 
-    Attributes:
-        path: of the directory, ``<output>/<name>/<variant>-s<seed>-<hash>``.
-        manifest: status, versions, seeds, hash, budget spent, result.
-        config: the full configuration.
-        history: one row per generation.
-        champion: the champion team; a baseline has none.
-        hall_of_fame: the teams that the champion was chosen from.
-        robustness: one row per perturbation and level.
-        trace: the champion's path in the first test episode.
-        tiles: the grid world of the trace: path and cues of every tile at its end.
-        plots: directory of the figures.
+    docs/run-directory.md says what each of them holds. Some are not there in every run: a baseline has no history,
+    champion and hall of fame, and only grid worlds have tiles.
     """
 
     path: Path
@@ -91,16 +83,13 @@ class RunDirectory:
     def claimed(
         self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool
     ) -> Iterator[bool]:
-        """Hold the directory, made if need be, against other processes.
+        """Hold the directory, made if need be, against other processes; yields whether the run is finished already.
 
         Args:
-            full_hash: of the run, see `configuration_hash`.
+            full_hash: the run's `configuration_hash`.
             configuration: all its settings, as plain data.
-            resume: whether to go on with an unfinished run.
-            lengthen: whether to make a finished one longer.
-
-        Yields:
-            Whether the run is finished already.
+            resume: whether an unfinished run may be gone on with.
+            lengthen: whether a finished one may be made longer.
 
         Raises:
             ExneatError: the directory cannot be made or used, or holds something else than this run.
@@ -113,9 +102,34 @@ class RunDirectory:
                     delete(orphan)
             yield is_finished
 
-    def held(self) -> contextlib.AbstractContextManager[None]:
-        """Hold the directory against other processes, see `locks.held`."""
-        return held(self.path)
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold the directory against other processes, and other threads of this one.
+
+        The lock is on the directory itself: nothing is left behind, and a killed process frees it.
+
+        Raises:
+            ExneatError: another process holds it, or it cannot be opened.
+        """
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError as error:
+            raise ExneatError(f"{self.path}: cannot be opened: {error.strerror}") from error
+        try:
+            _lock(self.path, descriptor)
+            if not _is_still(self.path, descriptor):
+                raise ExneatError(f"{self.path}: was removed by another process at this moment; try again")
+            yield
+        finally:
+            os.close(descriptor)
+
+    def is_held(self) -> bool:
+        """Whether a process holds the directory now."""
+        try:
+            with self.held():
+                return False
+        except ExneatError:
+            return True
 
     def _may_be_used(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> bool:
         if not self.manifest.exists():
@@ -127,9 +141,9 @@ class RunDirectory:
         manifest, asked = self.read_manifest(), configuration["generations"]
         if manifest.configuration_hash != full_hash:
             raise ExneatError(f"{self.path}: holds another run: {self._difference(configuration)}\n{_ELSEWHERE}")
-        if self.is_finished(full_hash, asked):
-            return True
         there, is_done = manifest.generations, manifest.status == DONE
+        if is_done and there == asked:
+            return True
         if asked < there:
             raise ExneatError(
                 f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
@@ -173,9 +187,7 @@ class RunDirectory:
 
     def is_there(self) -> bool:
         """Whether the directory holds a run, as far as one can see."""
-        with contextlib.suppress(OSError):
-            return self.manifest.exists()
-        return False
+        return os.path.exists(self.manifest)
 
     def is_finished(self, full_hash: str | None = None, generations: int | None = None) -> bool:
         """Whether a run is there and done, with this hash and length if they are given.
@@ -219,3 +231,34 @@ class RunDirectory:
 def find_runs(output: Path) -> list[RunDirectory]:
     """Every run below an output root, in alphabetical order."""
     return [RunDirectory((output / manifest).parent) for manifest in sorted(glob("*/*/manifest.json", root_dir=output))]
+
+
+def _lock(directory: Path, descriptor: int) -> None:
+    for attempt in range(1, _TRIES + 1):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if attempt == _TRIES:
+                holder = f"process id {_holder(descriptor)}"
+                raise ExneatError(f"{directory}: another process is writing there ({holder})") from None
+            time.sleep(_PAUSE)
+        except OSError as error:
+            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that knows flock"
+            raise ExneatError(why) from error
+
+
+def _is_still(directory: Path, descriptor: int) -> bool:
+    with contextlib.suppress(OSError):
+        return os.path.samefile(directory, descriptor)
+    return False
+
+
+def _holder(descriptor: int) -> str:
+    """Id of the process that holds the lock, where the kernel tells."""
+    with contextlib.suppress(OSError):
+        inode = os.fstat(descriptor).st_ino
+        for fields in map(str.split, Path("/proc/locks").read_text(encoding="ascii").splitlines()):
+            if "FLOCK" in fields and "->" not in fields and fields[-3].endswith(f":{inode}"):
+                return fields[-4]
+    return "unknown"

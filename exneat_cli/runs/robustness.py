@@ -34,7 +34,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
-    if not directory.is_finished(settings.full_hash, settings.trained_generations):
+    if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):
         raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
     return settings
 
@@ -42,9 +42,8 @@ def load_settings(directory: RunDirectory) -> RunSettings:
 def is_finished(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> bool:
     """Whether the run of these settings is done and was tested at every level of `sweeps`."""
     directory = settings.directory
-    if not directory.is_finished(settings.full_hash, settings.trained_generations):
-        return False
-    return not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
+    is_trained = directory.is_finished(settings.full_hash, settings.trained_generations)
+    return is_trained and not any(missing_levels(directory, sweep, episodes) for sweep in sweeps)
 
 
 def missing_levels(directory: RunDirectory, sweep: Sweep, episodes: int) -> tuple[float, ...]:
@@ -82,12 +81,7 @@ def run_robustness(
 ) -> int:
     """Test a finished run at every level that is not in its robustness.csv yet; returns how many that were.
 
-    Args:
-        directory: of the run.
-        sweeps: what is perturbed.
-        episodes: test episodes per level, the same ones at all levels and for all runs.
-        executor: where episodes run.
-        progress: told what happens.
+    Each level gets that many test `episodes`, the same ones at all levels and for all runs.
 
     Raises:
         ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
@@ -116,27 +110,21 @@ def run_robustness(
 
 def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores: Mapping[float, Score]) -> None:
     rows = [robustness_row(settings, sweep.name, level, each) for level, each in scores.items()]
-    failed = [each.failed_episodes for each in scores.values()]
-    named = [f"{sweep.name}={row.level!r}, {row.episodes} episodes" for row in rows]
-    # Counted first: after a kill in between, the levels are tested and counted once more, not skipped.
-    _count_failures(directory, dict(zip(named, failed, strict=True)))
+    # Failures are counted first: after a kill in between, the levels are tested and counted once more, not skipped.
+    failed = directory.read_manifest().failed_robustness_episodes
+    for row, score in zip(rows, scores.values(), strict=True):
+        failed[f"{sweep.name}={row.level!r}, {row.episodes} episodes"] = score.failed_episodes
+    directory.update_manifest(failed_robustness_episodes={key: count for key, count in failed.items() if count})
     merge_robustness(directory.robustness, rows)
 
 
-def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
-    counted = {**directory.read_manifest().failed_robustness_episodes, **failed}
-    directory.update_manifest(failed_robustness_episodes={key: count for key, count in counted.items() if count})
-
-
 def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | RandomActions:
-    rule = settings.algorithm.rule
-    if rule is None:
-        champion = read_champion(directory.champion)
-        if champion.variant != settings.variant:
-            raise ExneatError(
-                f"{directory.champion}: expected a champion of {settings.variant}, got {champion.variant}"
-            )
-        if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
-            raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
-        return champion.brain()
-    return acting_by_rule(rule, settings.task)
+    if settings.algorithm.rule is not None:
+        return acting_by_rule(settings.algorithm.rule, settings.task)
+    champion = read_champion(directory.champion)
+    if champion.variant != settings.variant:
+        variants = f"expected a champion of {settings.variant}, got {champion.variant}"
+        raise ExneatError(f"{directory.champion}: {variants}")
+    if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
+        raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
+    return champion.brain()

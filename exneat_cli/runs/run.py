@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-import msgspec
 import yaml
 
 from exneat_cli.errors import ExneatError
@@ -28,9 +27,8 @@ from exneat_cli.records import (
     write_history,
 )
 from exneat_cli.rollouts import Runner, keep_clusters
-from exneat_cli.runs.champion import choose_champion, measure_baseline
 from exneat_cli.runs.progress import Progress
-from exneat_cli.runs.scores import summary_sentence
+from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
@@ -38,14 +36,7 @@ from exneat_cli.seeding import STREAMS
 
 @dataclass(frozen=True)
 class Finished:
-    """A run that is done.
-
-    Attributes:
-        directory: where its files are.
-        result: test figures of champion, standing still and first generation; see the manifest.
-        summary: the same in one sentence.
-        trained_now: False if it was found finished.
-    """
+    """A run that is done: its figures, the same in one sentence, and whether it was trained now or found finished."""
 
     directory: RunDirectory
     result: Result
@@ -57,13 +48,9 @@ class Finished:
 def train(
     settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
-    """Do one run, or find it done.
+    """Do one run, or find it done; nothing is shown without `progress`, and `command` is for the manifest.
 
-    Args:
-        settings: see there.
-        progress: told what happens; nothing is shown without it.
-        command: the command line that asked for it, for the manifest.
-        go_on: go on with an unfinished run also without `settings.resume`, which alone makes a finished one longer.
+    An unfinished run is gone on with if `go_on` or `settings.resume`, which alone makes a finished one longer.
 
     Raises:
         ExneatError: the directory is unusable or holds something else, or no team survived.
@@ -72,16 +59,15 @@ def train(
     progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
-    resume, lengthen = settings.resume or go_on, settings.resume
-    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=lengthen) as was_done:
+    resume = settings.resume or go_on
+    with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=settings.resume) as was_done:
         if not was_done:
             with _recorded(directory, settings, progress, command):
                 if settings.algorithm.rule:
                     result = measure_baseline(settings, directory)
                 else:
-                    training = Training.resumed(
-                        settings, read_checkpoints(directory.path, settings.full_hash), progress.say
-                    )
+                    checkpoints = read_checkpoints(directory.path, settings.full_hash)
+                    training = Training.resumed(settings, checkpoints, progress.say)
                     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
                         while not training.is_over:
                             training.advance(runner)
@@ -108,10 +94,9 @@ def _recorded(
 ) -> Iterator[None]:
     """Keep the manifest: how the run began, and how it ended if that is before its result."""
     before = directory.read_manifest() if directory.is_there() else None
-    manifest = _first_manifest(settings, command)
+    manifest = _manifest(settings, command, before)
     if before:
         _tell_other_versions(before, progress)
-        manifest = msgspec.structs.replace(manifest, started=before.started, resumed=(*before.resumed, _now()))
         directory.forget_what_was_derived()
     try:
         directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
@@ -126,24 +111,21 @@ def _recorded(
 
 def _mark_unfinished(directory: RunDirectory, error: BaseException) -> None:
     interrupted = isinstance(error, KeyboardInterrupt) or signal_heard() is not None
+    ended = {"status": INTERRUPTED} if interrupted else {"status": FAILED, "error": f"{type(error).__name__}: {error}"}
     with contextlib.suppress(ExneatError):  # a full disk must not hide the reason
-        if not directory.is_there() or directory.read_manifest().status != RUNNING:
-            return
-        if interrupted:
-            directory.update_manifest(status=INTERRUPTED)
-        else:
-            directory.update_manifest(status=FAILED, error=f"{type(error).__name__}: {error}")
+        if directory.is_there() and directory.read_manifest().status == RUNNING:
+            directory.update_manifest(**ended)
 
 
 def _tell_other_versions(before: Manifest, progress: Progress) -> None:
     now, then = provenance.versions(), before.versions
-    changed = [name for name in now if then.get(name) != now[name]]
+    changed = [f"{name} {then.get(name)} then, {now[name]} now" for name in now if then.get(name) != now[name]]
     if changed:
-        names = ", ".join(f"{name} {then.get(name)} then, {now[name]} now" for name in changed)
-        progress.say(f"{names}: results may differ from those of an undisturbed run")
+        progress.say(f"{', '.join(changed)}: results may differ from those of an undisturbed run")
 
 
-def _first_manifest(settings: RunSettings, command: Sequence[str]) -> Manifest:
+def _manifest(settings: RunSettings, command: Sequence[str], before: Manifest | None) -> Manifest:
+    """That of a run that begins now, or goes on where the one `before` ended."""
     return Manifest(
         format=MANIFEST_FORMAT,
         status=RUNNING,
@@ -154,7 +136,8 @@ def _first_manifest(settings: RunSettings, command: Sequence[str]) -> Manifest:
         configuration_hash=settings.full_hash,
         generations=settings.trained_generations,
         command=tuple(command),
-        started=_now(),
+        started=before.started if before else _now(),
+        resumed=(*before.resumed, _now()) if before else (),
         seeds={"root": settings.seed, "streams": STREAMS},
         versions=provenance.versions(),
         processor=provenance.processor(),

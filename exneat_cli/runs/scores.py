@@ -1,41 +1,131 @@
-"""Validation, test, and what the champion is compared with."""
+"""The end of a run: its champion, chosen on validation episodes and tested beside what is simpler, and its figures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
-from exneat_cli.brains import Brains
-from exneat_cli.records import Result, RobustnessRow, Score
-from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.algorithms import Team
+from exneat_cli.brains import Brains, acting_by_rule, assemble, motionless
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import (
+    UNPERTURBED,
+    Champion,
+    Genome,
+    Result,
+    RobustnessRow,
+    RunDirectory,
+    Score,
+    Scores,
+    merge_robustness,
+    write_csv,
+    write_hall_of_fame,
+    write_json,
+)
+from exneat_cli.rollouts import Outcomes, Runner, Trace
+from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import Task
 
 
-def score_all(outcomes: Outcomes) -> list[Score]:
-    """Summary of each brain's episodes."""
-    columns = (outcomes.fitness, outcomes.full_reward, outcomes.failed)
-    return [_score(*(values[k] for values in columns)) for k in range(len(outcomes.fitness))]
+def choose_champion(training: Training, directory: RunDirectory, progress: Progress) -> Result:
+    """Validate the candidates, test the best, write both; returns the figures for the manifest.
 
+    Source of the rule: Zhang (2025), section 3.3.
 
-def _score(fitness: NDArray[np.float64], full_reward: NDArray[np.float64], failed: NDArray[np.bool_]) -> Score:
-    return Score(
-        episodes=len(fitness),
-        fitness_mean=float(fitness.mean()),
-        fitness_std=float(fitness.std()),
-        full_reward_mean=float(full_reward.mean()),
-        full_reward_std=float(full_reward.std()),
-        failed_episodes=int(failed.sum()),
-        fitness=tuple(fitness.tolist()),
+    Raises:
+        ExneatError: there is no candidate.
+    """
+    settings, candidates = training.settings, training.search.candidates()
+    if not candidates or training.first_generation is None:
+        raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
+    last = training.history[-1]
+    directory.update_manifest(budget_spent={key: last[key] for key in ("episodes", "env_steps", "wall_seconds")})
+    progress.say(f"validating {len(candidates)} teams of the hall of fame")
+    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
+        brains = [_compile(settings, candidate.team) for candidate in candidates]
+        validation = score_all(runner.run(brains, shared_episodes("validation", settings.validation_episodes)))
+        best = max(range(len(candidates)), key=lambda k: validation[k].fitness_mean)
+        first, tests = _compile(settings, training.first_generation), shared_episodes("test", settings.test_episodes)
+        tested = score_all(runner.run([brains[best], _standing_still(settings), first], tests))
+        trace = runner.trace(brains[best], tests[0])
+    champion = candidates[best]
+    scores = Scores(
+        training={"fitness": champion.fitness, "generation": champion.generation + 1},
+        validation=validation[best],
+        test=tested[0],
+    )
+    write_hall_of_fame(directory.hall_of_fame, candidates, [each.fitness_mean for each in validation])
+    write_json(directory.champion, _champion(settings, champion.team, scores))
+    _write_trace(settings, directory, trace)
+    return Result(
+        training=last["best_so_far"],
+        validation=validation[best].fitness_mean,
+        champion=tested[0],
+        standing_still=tested[1],
+        first_generation=tested[2],
     )
 
 
-def score_brains(runner: Runner, brains: Sequence[Brains], purpose: str, episodes: int) -> list[Score]:
-    """Scores of several brains on the same ``"validation"`` or ``"test"`` episodes, side by side."""
-    return score_all(runner.run(brains, shared_episodes(purpose, episodes)))
+def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
+    """Test an agent that follows a rule; returns the figures for the manifest."""
+    assert settings.algorithm.rule is not None
+    acting = acting_by_rule(settings.algorithm.rule, settings.task)
+    episodes = unseen_episodes(settings, settings.test_episodes)
+    with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
+        (tested,) = score_all(runner.run(acting, episodes))
+        (standing,) = score_all(
+            runner.run([_standing_still(settings)], shared_episodes("test", settings.test_episodes))
+        )
+        trace = runner.trace(acting, episodes[0])
+    _write_trace(settings, directory, trace)
+    merge_robustness(directory.robustness, [robustness_row(settings, UNPERTURBED, 0.0, tested)])
+    return Result(champion=tested, standing_still=standing)
+
+
+def _compile(settings: RunSettings, team: Team) -> Brains:
+    return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
+
+
+def _standing_still(settings: RunSettings) -> Brains:
+    return motionless(settings.task.sensed_size, settings.task.resting_action)
+
+
+def _champion(settings: RunSettings, team: Team, scores: Scores) -> Champion:
+    return Champion(
+        variant=settings.variant,
+        task=settings.to_plain()["task"],
+        actuators=settings.task.actuator_names,
+        feed_forward=settings.evolution.feed_forward,
+        plan=settings.plan,
+        genomes=tuple(map(Genome.of, team.genomes)),
+        scores=scores,
+    )
+
+
+def _write_trace(settings: RunSettings, directory: RunDirectory, trace: Trace) -> None:
+    columns = ("step", *settings.task.trace_columns, *settings.task.terms)
+    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.steps.tolist())])
+    if trace.tiles is not None:
+        tiles = [(*place, *trace.tiles[place].tolist()) for place in np.ndindex(trace.tiles.shape[:2])]
+        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), tiles)
+
+
+def score_all(outcomes: Outcomes) -> list[Score]:
+    """Summary of each brain's episodes."""
+    return [
+        Score(
+            episodes=len(fitness),
+            fitness_mean=float(fitness.mean()),
+            fitness_std=float(fitness.std()),
+            full_reward_mean=float(full_reward.mean()),
+            full_reward_std=float(full_reward.std()),
+            failed_episodes=int(failed.sum()),
+            fitness=tuple(fitness.tolist()),
+        )
+        for fitness, full_reward, failed in zip(outcomes.fitness, outcomes.full_reward, outcomes.failed, strict=True)
+    ]
 
 
 def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
@@ -43,8 +133,7 @@ def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     tests = shared_episodes("test", episodes)
     if settings.algorithm.rule != "random":
         return tests
-    root = settings.seed
-    return [each._replace(actions=stream(root, "random_actions", k)) for k, each in enumerate(tests)]
+    return [each._replace(actions=stream(settings.seed, "random_actions", k)) for k, each in enumerate(tests)]
 
 
 def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:
@@ -61,10 +150,11 @@ def summary_sentence(task: Task, result: Result) -> str:
     """
     champion, standing = result.champion, result.standing_still
     digits = task.fitness_decimals
-    episodes = f"on {champion.episodes} test episodes"
+    episodes, failed = f"on {champion.episodes} test episodes", champion.failed_episodes
+    failures = f", {failed} of {champion.episodes} episodes failed" if failed else ""
     earned = (
         f"earned a {task.fitness_name} of {champion.fitness_mean:.{digits}f} on average "
-        f"(sd {champion.fitness_std:.{digits}f}{_failures(champion)}), "
+        f"(sd {champion.fitness_std:.{digits}f}{failures}), "
         f"beside {standing.fitness_mean:.{digits}f} for standing still"
     )
     first = result.first_generation
@@ -75,11 +165,6 @@ def summary_sentence(task: Task, result: Result) -> str:
         f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
         f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation."
     )
-
-
-def _failures(score: Score) -> str:
-    failed = score.failed_episodes
-    return f", {failed} of {score.episodes} episodes failed" if failed else ""
 
 
 def _clearly_better(one: Score, other: Score) -> bool:

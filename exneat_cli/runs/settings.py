@@ -128,11 +128,8 @@ class RunSettings:
         return plain
 
     def to_plain(self) -> dict[str, Any]:
-        """The settings as dicts, lists, numbers and strings; `from_plain` reads them back."""
-        plain: dict[str, Any] = asdict(self)
-        vector = self.geometry.vector
-        plain["geometry"]["vector"] = None if vector is None else list(vector)
-        return plain
+        """The settings as dicts, lists, tuples, numbers and strings; `from_plain` reads them back."""
+        return asdict(self)
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> RunSettings:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
 from exneat_cli.brains import assemble_all
-from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
+from exneat_cli.records import HISTORY_COLUMNS, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.seeding import training_episodes
@@ -24,12 +24,9 @@ _FIRST = "first_generation"
 
 @dataclass
 class Training:
-    """A training between two generations; `advance` does the next one.
+    """A training between two generations, with a row of history for each that is done; `advance` does the next one.
 
     Attributes:
-        settings: of the run.
-        search: the algorithm at work.
-        history: one row per generation that is done.
         first_generation: the best team of the first generation, which is random; None before it.
         began: clock time (s) at which an undisturbed training would have begun.
     """
@@ -46,43 +43,35 @@ class Training:
         return cls(settings, settings.algorithm.start(_problem(settings)))
 
     @classmethod
-    def restored(cls, settings: RunSettings, checkpoint: Checkpoint) -> Training:
-        """The training that `checkpoint` was taken of, or one that goes on just as it would have.
-
-        Raises:
-            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is damaged, or of other settings.
-        """
-        problem = _problem(settings)
-        history = [_sound(number, row) for number, row in enumerate(checkpoint.plain["history"], start=1)]
-        if not 1 <= len(history) == checkpoint.generation <= settings.generations:
-            raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
-        (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
-        search = settings.algorithm.restored(problem, State(checkpoint.plain["search"], checkpoint.arrays))
-        return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
-
-    @classmethod
-    def resumed(
-        cls, settings: RunSettings, checkpoints: Iterable[Checkpoint | str], say: Callable[[str], None]
-    ) -> Training:
+    def resumed(cls, settings: RunSettings, checkpoints: Iterable[State | str], say: Callable[[str], None]) -> Training:
         """Go on from the first checkpoint that is sound, else begin; the results are the same.
 
-        Args:
-            settings: of the run.
-            checkpoints: the newest first, with a line in place of each that cannot be read.
-            say: told what it goes on from.
+        The newest checkpoint comes first; a line, which is said, stands in place of each that cannot be read.
         """
         for checkpoint in checkpoints:
             if isinstance(checkpoint, str):
                 say(checkpoint)
                 continue
+            generation = checkpoint.plain["generation"]
             try:
-                training = cls.restored(settings, checkpoint)
+                training = cls._restored(settings, checkpoint)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-                say(f"checkpoint of generation {checkpoint.generation}: damaged: {error!r}")
+                say(f"checkpoint of generation {generation}: damaged: {error!r}")
             else:
-                say(f"going on after generation {checkpoint.generation}")
+                say(f"going on after generation {generation}")
                 return training
         return cls.start(settings)
+
+    @classmethod
+    def _restored(cls, settings: RunSettings, checkpoint: State) -> Training:
+        """The training that `checkpoint` was taken of, unless it is damaged or of other settings."""
+        problem, plain = _problem(settings), checkpoint.plain
+        history = [_sound(number, row) for number, row in enumerate(plain["history"], start=1)]
+        if not 1 <= len(history) == plain["generation"] <= settings.generations:
+            raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
+        (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
+        search = settings.algorithm.restored(problem, State(plain["search"], checkpoint.arrays))
+        return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
 
     @property
     def is_over(self) -> bool:
@@ -131,13 +120,12 @@ class Training:
             }
         )
 
-    def checkpoint(self) -> Checkpoint:
+    def checkpoint(self) -> State:
         """All that the rest of the training depends on; taking it changes nothing."""
         assert self.first_generation is not None
-        state = self.search.state()
-        plain = {"search": state.plain, "history": self.history}
-        arrays = {**state.arrays, **pack_teams([self.first_generation], _FIRST)}
-        return Checkpoint(len(self.history), plain, arrays)
+        search = self.search.state()
+        plain = {"generation": len(self.history), "search": search.plain, "history": self.history}
+        return State(plain, {**search.arrays, **pack_teams([self.first_generation], _FIRST)})
 
 
 def _problem(settings: RunSettings) -> Problem:

@@ -20,7 +20,7 @@ from exneat_cli.records import (
     write_history,
     write_json,
 )
-from exneat_cli.records.history import COLUMNS
+from exneat_cli.records.tables import COLUMNS
 from tests.analysis.fake_champions import a_score, grid_champion, modular_champion
 
 Levels = Mapping[tuple[str, float], tuple[float, float]]

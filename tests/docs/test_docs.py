@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from exneat_cli.records.champion import Champion, Connection, Node, Scores
-from exneat_cli.records.history import COLUMNS
 from exneat_cli.records.manifest import Manifest, Result, Score
-from exneat_cli.records.robustness import RobustnessRow
+from exneat_cli.records.tables import COLUMNS, RobustnessRow
 from exneat_cli.runs import RunSettings
 from exneat_cli.tasks import TASKS, AntTask
 from exneat_cli.wiring import Module, Pin, Plan

@@ -14,7 +14,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from exneat_cli.records import Checkpoint, read_checkpoints, write_checkpoint
+from exneat_cli.algorithms import State
+from exneat_cli.records import read_checkpoints, write_checkpoint
 from exneat_cli.records.checkpoint import with_digest
 
 ARRAYS = {"0.current.id": np.arange(5), "0.current.node.bias": np.linspace(0.0, 1.0, 7)}
@@ -22,19 +23,18 @@ PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}
 
 
 def written(directory: Path, generation: int = 3, configuration_hash: str = "hash") -> Path:
-    write_checkpoint(directory, Checkpoint(generation, PLAIN, ARRAYS), configuration_hash)
+    write_checkpoint(directory, State({"generation": generation, **PLAIN}, ARRAYS), configuration_hash)
     return directory / f"checkpoint-{generation:06d}.npz"
 
 
-def read(directory: Path) -> list[Checkpoint | str]:
+def read(directory: Path) -> list[State | str]:
     return list(read_checkpoints(directory, "hash"))
 
 
-def is_whole(found: Checkpoint | str, generation: int = 3) -> bool:
+def is_whole(found: State | str, generation: int = 3) -> bool:
     if isinstance(found, str):
         return False
-    assert found.generation == generation
-    assert found.plain == PLAIN
+    assert found.plain == {"generation": generation, **PLAIN}
     assert found.arrays.keys() == ARRAYS.keys()
     return all(np.array_equal(found.arrays[name], column) for name, column in ARRAYS.items())
 
@@ -56,7 +56,7 @@ def test_it_is_a_plain_npz_that_needs_no_pickle(tmp_path: Path) -> None:
 
 def test_a_number_that_is_not_finite_is_never_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError):
-        write_checkpoint(tmp_path, Checkpoint(1, {"fitness": [float("nan")]}, {}), "hash")
+        write_checkpoint(tmp_path, State({"generation": 1, "fitness": [float("nan")]}, {}), "hash")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -124,4 +124,4 @@ def test_a_damaged_checkpoint_of_a_later_generation_never_crowds_out_a_sound_one
     for generation in (1, 2, 3):
         written(tmp_path, generation)
         assert is_whole(read(tmp_path)[0], generation)
-    assert [found.generation for found in read(tmp_path) if isinstance(found, Checkpoint)] == [3, 2]
+    assert [found.plain["generation"] for found in read(tmp_path) if isinstance(found, State)] == [3, 2]

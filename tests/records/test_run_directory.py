@@ -20,7 +20,6 @@ from exneat_cli.records import (
     Score,
     configuration_hash,
     find_runs,
-    is_held,
 )
 
 SETTINGS = {"generations": 5, "seed": 0, "task": {"name": "ant", "patience": 100}}
@@ -151,10 +150,10 @@ def test_what_a_killed_run_left_is_taken_up_and_its_unfinished_writes_are_gone(t
 
 def test_a_second_writer_is_refused_while_the_first_one_lives(tmp_path: Path) -> None:
     run = started(tmp_path / "run", "running")
-    assert not is_held(run.path)
+    assert not run.is_held()
     refused = pytest.raises(ExneatError, match=rf"another process .* \(process id {os.getpid()}\)")
     with run.claimed("hash", SETTINGS, resume=True, lengthen=True), refused:
-        assert is_held(run.path)
+        assert run.is_held()
         claim(run, resume=True)
     assert not claim(run, resume=True)
 

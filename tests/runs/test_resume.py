@@ -12,7 +12,7 @@ from exneat_cli.algorithms import RECURRENT
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Sweep
-from exneat_cli.runs import Progress, RunSettings, champion, run_robustness, train
+from exneat_cli.runs import Progress, RunSettings, run_robustness, scores, train
 from exneat_cli.runs import run as run_module
 from exneat_cli.tasks import AntTask, TrackMaze
 from exneat_cli.wiring import Geometry
@@ -29,6 +29,7 @@ class Listener(Progress):
     """Remembers what it is told."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.said: list[str] = []
 
     def say(self, text: str) -> None:
@@ -64,8 +65,8 @@ def content(directory: RunDirectory) -> dict[str, str]:
 
 
 def stop_at_call(patch: pytest.MonkeyPatch, name: str, number: int) -> None:
-    """Let the `number`-th call of a function that `runs.run` or `runs.champion` uses raise `StoppedError`."""
-    module = run_module if hasattr(run_module, name) else champion
+    """Let the `number`-th call of a function that `runs.run` or `runs.scores` uses raise `StoppedError`."""
+    module = run_module if hasattr(run_module, name) else scores
     original, calls = getattr(module, name), []
 
     def counted(*arguments: Any) -> Any:

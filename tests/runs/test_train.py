@@ -21,7 +21,8 @@ from exneat_cli.records import RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs import training as training_module
-from exneat_cli.runs.scores import score_brains
+from exneat_cli.runs.scores import score_all
+from exneat_cli.seeding import shared_episodes
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import GEOMETRIES, LINKAGES, Geometry, Wiring
 
@@ -155,7 +156,7 @@ def test_the_champion_in_the_file_earns_the_figures_beside_it(tmp_path: Path) ->
     champion = read_champion(finished.directory.champion)
     assert champion.plan == settings.plan
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
-        (tested,) = score_brains(runner, [champion.brain()], "test", settings.test_episodes)
+        (tested,) = score_all(runner.run([champion.brain()], shared_episodes("test", settings.test_episodes)))
     assert tested == champion.scores.test == finished.result.champion
 
 

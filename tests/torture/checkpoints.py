@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from exneat_cli.records import Checkpoint, read_checkpoints
+from exneat_cli.algorithms import State
+from exneat_cli.records import read_checkpoints
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs.training import Training
 from exneat_cli.tasks import AntTask, TrackMaze
@@ -37,7 +38,7 @@ class _Original(NamedTuple):
     data: bytes
     before: bytes
     of_another_run: bytes
-    restored: dict[int, Checkpoint]
+    restored: dict[int, State]
 
 
 def damage_checkpoints(count: int, seed: int) -> list[Finding]:
@@ -76,13 +77,13 @@ def _original(settings: RunSettings, folder: Path) -> _Original:
     run = train(settings).directory
     other = train(replace(settings, seed=2, output=str(folder / "other"))).directory
     before, newest = sorted(run.path.glob("checkpoint-*.npz"))
-    restored = {each.generation: each for each in read_checkpoints(run.path, settings.full_hash) if _is_sound(each)}
+    restored = {
+        each.plain["generation"]: each
+        for each in read_checkpoints(run.path, settings.full_hash)
+        if isinstance(each, State)
+    }
     other_data = (other.path / newest.name).read_bytes()
     return _Original(settings, newest, newest.read_bytes(), before.read_bytes(), other_data, restored)
-
-
-def _is_sound(each: Checkpoint | str) -> bool:
-    return isinstance(each, Checkpoint)
 
 
 def _damaged(original: _Original, flips: int, chance: random.Random) -> Iterator[tuple[str, str, bytes]]:
@@ -122,9 +123,9 @@ def _restore(original: _Original, data: bytes) -> str:
     return "the same" if generation == settings.generations else "fell back"
 
 
-def _same(one: Checkpoint, other: Checkpoint) -> bool:
+def _same(one: State, other: State) -> bool:
     """Whether two checkpoints hold the same; NaN equals nothing, not even itself."""
-    if one.generation != other.generation or one.arrays.keys() != other.arrays.keys():
+    if one.arrays.keys() != other.arrays.keys():
         return False
     same = [np.array_equal(one.arrays[name], other.arrays[name]) for name in one.arrays]
     return all(same) and _plain(one.plain) == _plain(other.plain)

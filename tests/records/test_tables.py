@@ -1,13 +1,30 @@
-"""robustness.csv: merged by level, in one order, read as data."""
+"""Tables keep every bit; robustness.csv is merged by level, in one order, and read as data."""
 
 from __future__ import annotations
 
+import csv
+import math
 from pathlib import Path
 
 import pytest
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness
+from exneat_cli.records import UNPERTURBED, RobustnessRow, merge_robustness, read_robustness, write_csv, write_history
+
+
+def test_floats_in_csv_keep_every_bit(tmp_path: Path) -> None:
+    values = [0.1 + 0.2, math.pi, 1e-300, -0.0, 5.0]
+    write_csv(tmp_path / "t.csv", ["a"], [[value] for value in values])
+    with (tmp_path / "t.csv").open() as file:
+        assert [float(row["a"]) for row in csv.DictReader(file)] == values
+
+
+def test_history_has_the_known_columns_in_their_order_and_an_algorithms_own_before_the_last(tmp_path: Path) -> None:
+    known = "generation,best_fitness,mean_fitness,median_fitness,best_so_far,episodes,env_steps,species,"
+    known += "connections,hidden_nodes,failed_episodes,extinctions"
+    row = {"wall_seconds": 0.1, "sigma": 0.5, **dict.fromkeys(reversed(known.split(",")), 1)}
+    write_history(tmp_path / "history.csv", [row])
+    assert (tmp_path / "history.csv").read_text().splitlines()[0] == f"{known},sigma,wall_seconds"
 
 
 def row(parameter: str, level: float, fitness: float = 0.5, episodes: int = 20) -> RobustnessRow:
