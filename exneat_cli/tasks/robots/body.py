@@ -174,6 +174,8 @@ def _named_parts(model: mujoco.MjModel, trunk: int, parts: Mapping[str, Sequence
     named: dict[tuple[int, ...], str] = {}
     taken: dict[int, str] = {}
     for name, roots in parts.items():
+        if not roots:
+            raise ConfigError(f"task.parts.{name}", "the names of one or more bodies", "none")
         bodies: list[int] = []
         for root in roots:
             if root not in known:
