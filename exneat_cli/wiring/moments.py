@@ -46,17 +46,16 @@ def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:
         teams: (T, sensed) of what each team's brain sensed.
     """
     found = []
-    for index, (pins, _, _) in enumerate(plan.subpopulation_shapes):
-        sharers = [module for module in plan.modules if module.subpopulation == index]
-        parts = [
-            _of_pins(teams, t, [pin.index if pin.is_sensor else -1 for pin in module.pins])
-            for t in range(len(teams.counts))
-            for module in sharers
+    for index, (count, _, _) in enumerate(plan.subpopulation_shapes):
+        entries = [
+            np.array([pin.index if pin.is_sensor else -1 for pin in module.pins], np.int64)
+            for module in plan.modules
+            if module.subpopulation == index
         ]
-        found.append(merged(parts, pins))
+        parts = [
+            Moments(*(np.where(own >= 0, values[team, own], 0.0) for values in teams))
+            for team in range(len(teams.counts))
+            for own in entries
+        ]
+        found.append(merged(parts, count))
     return tuple(found)
-
-
-def _of_pins(teams: Moments, team: int, entries: list[int]) -> Moments:
-    senses = np.array(entries) >= 0
-    return Moments(*(np.where(senses, values[team, entries], 0.0) for values in teams))

@@ -32,7 +32,7 @@ from exneat_cli.errors import check_real, check_whole
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory
 from exneat_cli.tasks import ENDED, RUNNING, TASKS, Part, Simulation, Task
-from exneat_cli.wiring import LINKAGES, Pin, Sizes
+from exneat_cli.wiring import LINKAGES, Pin
 
 
 class CorridorWorld(NamedTuple):
@@ -152,7 +152,7 @@ class Draws(Search):
         return {"record": self.fitness}
 
 
-def opposite(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+def opposite(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The first output of the last other part."""
     peers = [k for k in range(len(parts)) if k != own]
     return (Pin(0, peers[-1], delayed=True),)
