@@ -15,8 +15,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from exneat_cli.algorithms import ACTIVATIONS, ArrayGenome, Candidate
+from exneat_cli.algorithms.neat.conversion import check_genes, check_genome
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
-from exneat_cli.algorithms.neat.soundness import check_genes, check_genome
 from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
 from exneat_cli.records.files import write_whole

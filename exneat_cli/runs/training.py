@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
+from exneat_cli.algorithms import Problem, Results, Search, Team, pack_teams, unpack_teams
 from exneat_cli.brains import assemble_all
 from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
@@ -57,7 +57,7 @@ class Training:
         if not 1 <= len(history) == checkpoint.generation <= settings.generations:
             raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
         (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
-        search = settings.algorithm.restored(problem, State(checkpoint.plain["search"], checkpoint.arrays))
+        search = settings.algorithm.restored(problem, (checkpoint.plain["search"], checkpoint.arrays))
         return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
 
     @classmethod
@@ -95,13 +95,13 @@ class Training:
         teams: list[Team] = []
         outcomes: list[Outcomes] = []
         while not over:
-            trials = self.search.ask()
-            genomes = [team.genomes for team in trials.teams]
+            asked, count = self.search.ask()
+            genomes = [team.genomes for team in asked]
             brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
             done = sum(each.steps.shape[1] for each in outcomes)
-            episodes = training_episodes(settings.seed, len(self.history), trials.episodes, first=done)
+            episodes = training_episodes(settings.seed, len(self.history), count, first=done)
             outcomes.append(runner.run(brains, episodes, moments=settings.algorithm.wants_moments))
-            teams += trials.teams
+            teams += asked
             over = self.search.tell(_results(settings, outcomes[-1]))
         self._record(teams, outcomes)
 
@@ -134,10 +134,9 @@ class Training:
     def checkpoint(self) -> Checkpoint:
         """All that the rest of the training depends on; taking it changes nothing."""
         assert self.first_generation is not None
-        state = self.search.state()
-        plain = {"search": state.plain, "history": self.history}
-        arrays = {**state.arrays, **pack_teams([self.first_generation], _FIRST)}
-        return Checkpoint(len(self.history), plain, arrays)
+        search, arrays = self.search.state()
+        arrays = {**arrays, **pack_teams([self.first_generation], _FIRST)}
+        return Checkpoint(len(self.history), {"search": search, "history": self.history}, arrays)
 
 
 def _problem(settings: RunSettings) -> Problem:

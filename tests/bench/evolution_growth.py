@@ -46,7 +46,7 @@ class Growing:
         self._plan, settings = plan, EvolutionSettings()
         self.coevolution = Coevolution(Problem(plan, settings, population, episodes=1, pairing="rank", seed=root))
         self._rng = np.random.default_rng(root)
-        self._teams = self.coevolution.ask().teams
+        self._teams = self.coevolution.ask()[0]
 
     def advance(self) -> float:
         """Wall seconds of all that a generation is but its episodes: tell, ask and making the brains."""
@@ -56,7 +56,7 @@ class Growing:
 
     def _advance(self, results: Results) -> None:
         self.coevolution.tell(results)
-        self._teams = self.coevolution.ask().teams
+        self._teams = self.coevolution.ask()[0]
         assemble_all(self._plan, [team.genomes for team in self._teams], feed_forward=True)
 
     @property

@@ -58,7 +58,7 @@ def quite_different_brains(task: Task) -> list[Brains]:
     """Random networks, one that follows all it senses, one that fails at once, and one that does nothing."""
     settings = RunSettings(task=task, algorithm="neat", population=4)  # type: ignore[arg-type]
     problem = Problem(settings.plan, settings.evolution, 4, 1, "rank", seed=4)
-    teams = settings.algorithm.start(problem).ask().teams
+    teams = settings.algorithm.start(problem).ask()[0]
     networks = [assemble(settings.plan, t.genomes, feed_forward=settings.evolution.feed_forward) for t in teams]
     sizes = task.sensed_size, len(task.actuator_names)
     failing = motionless(sizes[0], np.full(sizes[1], np.nan))
