@@ -66,8 +66,12 @@ class Coevolution(Search):
         if self._teams and not self._fitness:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
         ranked = [self._teams[k].ids for k in best_first(self._fitness)]
+        self._extinctions = 0
         if self._fitness:
-            self._reproduce()
+            shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
+            for index, subpopulation in enumerate(self._subpopulations):
+                fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
+                self._extinctions += subpopulation.advance(fitness)
         orders = [
             self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
             for index, subpopulation in enumerate(self._subpopulations)
@@ -93,21 +97,8 @@ class Coevolution(Search):
         self._generation += 1
         return True
 
-    def _reproduce(self) -> None:
-        """Replace the genomes of every subpopulation by the fitness of their teams."""
-        shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
-        self._extinctions = 0
-        for index, subpopulation in enumerate(self._subpopulations):
-            fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
-            self._extinctions += subpopulation.advance(fitness)
-
     def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
-        """One subpopulation's genomes in the order of the teams that they join: survivors, then offspring shuffled.
-
-        Args:
-            ids: of the genomes there are now.
-            ranked: of those of the last generation, those of the best team first.
-        """
+        """One subpopulation's `ids` in the order of the teams that they join: survivors as `ranked`, then offspring."""
         if self._problem.pairing == "index":
             return ids
         there, before = set(ids), set(ranked)
@@ -199,12 +190,10 @@ class NEAT(ExNEAT):
 
 
 def with_candidate(hall_of_fame: Sequence[Candidate], offered: Candidate) -> list[Candidate]:
-    """The hall of fame after a team that did not fail was offered to it.
+    """The hall of fame after a team that did not fail was offered to it, which enters if it is good enough.
 
-    Args:
-        hall_of_fame: at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes;
-            the best first, of equals the earlier one first.
-        offered: enters, with the best fitness that it ever had, if it is good enough.
+    There are at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes, with the
+    best fitness that each ever had; the best first, of equals the earlier one first.
     """
     entries = {entry.team.ids: entry for entry in hall_of_fame}
     known = entries.get(offered.team.ids)

@@ -7,36 +7,87 @@ modules read them, then whatever else is evaluated, then one that stays 0 and st
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ArrayGenome
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, end_to_end, mark_sources, node_row, row_of
 from exneat_cli.brains.brain import Brains
-from exneat_cli.brains.wiring_arrays import wiring_arrays
 from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
 
-def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Brains:
-    """Compile one genome per subpopulation into the brain that `plan` wires.
+class WiringArrays(NamedTuple):
+    """A plan of M modules with P pins in all, S subpopulations and A actuators, for compiled code.
+
+    Attributes:
+        observation_size: length of what is sensed.
+        inputs: (S,) pins of each module.
+        read_outside: (S,) how many of the first nodes others read: outputs, and the initial hidden nodes where linked.
+        subpopulation: (M,) of each module.
+        first_pin: (M + 1,) the pins of module m are first_pin[m] to first_pin[m + 1].
+        pin_module: (P,) the module that is read; -1 for a sensor.
+        pin_index: (P,) which entry of what is sensed, or which node of the module.
+        pin_delayed: (P,) whether the value of the previous step is read.
+        driver: (A,) the module that sets each actuator; -1 for none.
+        driver_output: (A,) which of its outputs.
+    """
+
+    observation_size: int
+    inputs: NDArray[np.int64]
+    read_outside: NDArray[np.int64]
+    subpopulation: NDArray[np.int64]
+    first_pin: NDArray[np.int64]
+    pin_module: NDArray[np.int64]
+    pin_index: NDArray[np.int64]
+    pin_delayed: NDArray[np.bool_]
+    driver: NDArray[np.int64]
+    driver_output: NDArray[np.int64]
+
+
+@functools.lru_cache(maxsize=16)
+def wiring_arrays(plan: Plan) -> WiringArrays:
+    """The arrays of `plan`, which must have at least one module."""
+    shapes, read_outside = plan.subpopulation_shapes, np.zeros(len(plan.subpopulation_shapes), np.int64)
+    pins = [pin for module in plan.modules for pin in module.pins]
+    driver = np.full(plan.action_size, -1, np.int64)
+    driver_output = np.zeros(plan.action_size, np.int64)
+    for m, module in enumerate(plan.modules):
+        read_outside[module.subpopulation] = module.outputs + (module.hidden if plan.hidden_is_linked(m) else 0)
+        drives = list(module.drives)
+        driver[drives] = m
+        driver_output[drives] = range(len(drives))
+    return WiringArrays(
+        observation_size=plan.observation_size,
+        inputs=np.array([inputs for inputs, _, _ in shapes], np.int64),
+        read_outside=read_outside,
+        subpopulation=np.array([module.subpopulation for module in plan.modules], np.int64),
+        first_pin=np.cumsum([0] + [len(module.pins) for module in plan.modules]),
+        pin_module=np.array([pin.module for pin in pins], np.int64),
+        pin_index=np.array([pin.index for pin in pins], np.int64),
+        pin_delayed=np.array([pin.delayed for pin in pins], np.bool_),
+        driver=driver,
+        driver_output=driver_output,
+    )
+
+
+def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
+    """Compile each team into the brain that `plan` wires.
 
     Args:
         plan: who senses and drives what; must have at least one module.
-        genomes: indexed by subpopulation; sharing modules each get a copy of the network.
+        teams: at least one, of a genome per subpopulation; sharing modules each get a copy of its network.
         feed_forward: whether the modules are feed-forward networks, else recurrent ones.
 
     Raises:
         ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
     """
-    return assemble_all(plan, [genomes], feed_forward=feed_forward)
-
-
-def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
-    """The brains of several teams, at least one; see `assemble`."""
     wiring = wiring_arrays(plan)
-    members = len(wiring.shapes)
+    members = len(wiring.inputs)
     if any(len(team) != members for team in teams):
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
     genomes = [genome for team in teams for genome in team]
@@ -75,16 +126,10 @@ def _room(plan: Plan, teams: int, nodes: int, edges: int, links: int) -> Brains:
 def _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains):  # type: ignore[no-untyped-def]
     """Fill in the brains of T teams of S genomes each.
 
-    Args:
-        wiring: the plan, of M modules and P pins.
-        nodes: (N,) genes of all genomes, team by team, each in the order of the subpopulations.
-        first_node: (T * S + 1,) the nodes of genome g are first_node[g] to first_node[g + 1].
-        connections: (C,) likewise.
-        first_connection: (T * S + 1,) likewise.
-        feed_forward: the kind of networks.
-        brains: with room for all.
+    Genomes come team by team, each in the order of the subpopulations: genome g has the `nodes` from first_node[g] to
+    first_node[g + 1], and `connections` likewise.
     """
-    members, modules = wiring.shapes.shape[0], wiring.subpopulation.size
+    members, modules = wiring.inputs.size, wiring.subpopulation.size
     # Of the networks, gene by gene: rows in the order of evaluation, local indices of nodes and of what is read.
     order, slot_of = np.zeros(nodes.size, np.int64), np.zeros(nodes.size, np.int64)
     source_of = np.zeros(connections.size, np.int64)
@@ -94,8 +139,8 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
     for t in range(brains.size.size):
         # 1. One network per genome.
         for s in range(members):
-            a, b = first_node[t * members + s], first_node[t * members + s + 1]
-            c, d = first_connection[t * members + s], first_connection[t * members + s + 1]
+            g = t * members + s
+            a, b, c, d = first_node[g], first_node[g + 1], first_connection[g], first_connection[g + 1]
             evaluated[s], slots[s] = _express(
                 wiring, s, nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
             )
@@ -105,11 +150,8 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
         brains.first_node[t + 1] = brains.first_node[t]
         for m in range(modules):
             s = wiring.subpopulation[m]
-            a, c, d = (
-                first_node[t * members + s],
-                first_connection[t * members + s],
-                first_connection[t * members + s + 1],
-            )
+            g = t * members + s
+            a, c, d = first_node[g], first_connection[g], first_connection[g + 1]
             rows, pins = order[a : a + evaluated[s]], pin_slot[wiring.first_pin[m] : wiring.first_pin[m + 1]]
             _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], pins, base[m], brains)
 
@@ -118,14 +160,8 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
 def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type: ignore[no-untyped-def]
     """Decide where the values of team `t` are kept, and write its links and actuators.
 
-    Args:
-        wiring: the plan.
-        t: which team.
-        slots: (S,) how many each network has.
-        feed_forward: the kind of networks.
-        base: (M + 1,) overwritten: the first slot of each module; they lie behind what is sensed.
-        pin_slot: (P,) overwritten: the slot that each pin reads.
-        brains: of all teams.
+    Network s has `slots[s]` of them. Overwritten are `base`, (M + 1,), by the first slot of each module, which lie
+    behind what is sensed, and `pin_slot`, (P,), by the slot that each pin reads.
     """
     base[0] = wiring.observation_size
     for m in range(wiring.subpopulation.size):
@@ -180,20 +216,12 @@ def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, b
 
 @compiled
 def _express(wiring, s, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
-    """Make the network of one genome; returns how many nodes it evaluates and how many value slots it has.
+    """Make the network of a genome of subpopulation `s`; returns how many nodes it evaluates and how many slots it has.
 
-    Args:
-        wiring: the plan.
-        s: the genome's subpopulation.
-        nodes: (N,) its genes.
-        connections: (C,) its genes.
-        feed_forward: evaluate nodes in the order of their dependencies, else all at once.
-        order: (N,) overwritten: the rows of the nodes to evaluate, in order.
-        slot_of: (N,) overwritten: local index of each node's value.
-        source_of: (C,) overwritten: local index of what each connection reads.
+    Overwritten are `order` by the rows of the nodes to evaluate, in order, and by local indices `slot_of`, of each
+    node's value, and `source_of`, of what each connection reads.
     """
-    inputs, hidden, outputs = wiring.shapes[s, 0], wiring.shapes[s, 1], wiring.shapes[s, 2]
-    read_outside = outputs + (hidden if wiring.hidden_is_linked[s] else 0)
+    inputs, read_outside = wiring.inputs[s], wiring.read_outside[s]
     # First the row of the node that each connection reads, or -1 - k for pin k.
     for i in range(connections.size):
         source = connections[i].source

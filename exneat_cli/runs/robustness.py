@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from exneat_cli.brains import Brains, RandomActions, acting_by_rule
+from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
@@ -128,7 +128,7 @@ def _count_failures(directory: RunDirectory, failed: Mapping[str, int]) -> None:
     directory.update_manifest(failed_robustness_episodes={key: count for key, count in counted.items() if count})
 
 
-def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | RandomActions:
+def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | None:
     rule = settings.algorithm.rule
     if rule is None:
         champion = read_champion(directory.champion)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms import Problem, Results, Search, Team, pack_teams, unpack_teams
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.records import HISTORY_COLUMNS, Checkpoint, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
@@ -97,7 +97,7 @@ class Training:
         while not over:
             asked, count = self.search.ask()
             genomes = [team.genomes for team in asked]
-            brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
+            brains = assemble(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
             done = sum(each.steps.shape[1] for each in outcomes)
             episodes = training_episodes(settings.seed, len(self.history), count, first=done)
             outcomes.append(runner.run(brains, episodes, moments=settings.algorithm.wants_moments))

@@ -37,13 +37,9 @@ def merged(parts: Iterable[Moments], size: int) -> Moments:
 
 
 def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:
-    """Of each subpopulation, the moments of its pins, (pins,), over teams and the modules that share it.
+    """Of each subpopulation, the moments of its pins, (pins,), over `teams`, (T, sensed), and modules that share it.
 
     Teams are merged in their order, within a team modules in theirs. Pins that read modules count 0.
-
-    Args:
-        plan: who senses what.
-        teams: (T, sensed) of what each team's brain sensed.
     """
     found = []
     for index, (count, _, _) in enumerate(plan.subpopulation_shapes):

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from exneat_cli.algorithms import Coevolution, EvolutionSettings, Problem, Results
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
@@ -57,7 +57,7 @@ class Growing:
     def _advance(self, results: Results) -> None:
         self.coevolution.tell(results)
         self._teams = self.coevolution.ask()[0]
-        assemble_all(self._plan, [team.genomes for team in self._teams], feed_forward=True)
+        assemble(self._plan, [team.genomes for team in self._teams], feed_forward=True)
 
     @property
     def connections(self) -> float:

@@ -21,11 +21,7 @@ _WHOLE = np.dtype(np.int64)
 
 
 def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
-    """The same genome in arrays.
-
-    Raises:
-        ExneatError: a node has an activation, aggregation or time constant that arrays do not hold.
-    """
+    """The same genome in arrays; raises what `tables_of` raises."""
     converted = ArrayGenome(genome.key)
     converted.fitness = genome.fitness
     nodes, connections = tables_of(genome)
@@ -73,13 +69,14 @@ def _node_row(gene: DefaultNodeGene) -> tuple[int, float, float, int]:
     return gene.key, gene.bias, gene.response, ACTIVATIONS.index(gene.activation)
 
 
-def check_genes(key: int, nodes: Nodes, connections: Connections) -> None:
-    """Refuse genes of the genome `key`, in any order, that make no graph.
+def check_genes(genome: ArrayGenome) -> None:
+    """Refuse a genome whose genes, in any order, make no graph.
 
     Raises:
         ValueError: a node or connection comes twice, a node's key is below 0, an activation does not exist, or a
             connection has an end that does not exist.
     """
+    key, nodes, connections = genome.key, genome.nodes, genome.connections
     keys = set(nodes["key"].tolist())
     ends = list(zip(connections["target"].tolist(), connections["source"].tolist(), strict=True))
     if len(keys) < len(nodes) or min(keys, default=0) < 0:
@@ -137,7 +134,7 @@ def unpack(
         prefix: as it was.
         shape: of the networks that they must make: inputs, initial hidden nodes and outputs.
         feed_forward: whether these must have no cycle.
-        stock: whether the genomes are neat-python's own, else they are in arrays.
+        stock: whether the genomes become neat-python's own again, else arrays.
 
     Raises:
         KeyError, ValueError: a column is missing, of the wrong type or length, or the genes make no such network.
@@ -151,7 +148,7 @@ def unpack(
     for key, own_nodes, own_connections in zip(keys.tolist(), nodes, connections, strict=True):
         genome = ArrayGenome(key)
         genome.nodes, genome.connections = own_nodes.copy(), own_connections.copy()
-        check_genes(key, own_nodes, own_connections)
+        check_genes(genome)
         check_genome(genome, shape[0], shape[2], feed_forward=feed_forward)
         ordered = np.lexsort((own_connections["source"], own_connections["target"]))
         if not stock and ((np.diff(own_nodes["key"]) < 0).any() or (np.diff(ordered) < 0).any()):
@@ -189,7 +186,7 @@ def pack_teams(teams: Sequence[Team], prefix: str) -> dict[str, NDArray[Any]]:
 
 
 def unpack_teams(columns: Columns, prefix: str, problem: Problem) -> list[Team]:
-    """The teams that `pack_teams` was given, from a file of anyone's; their genomes must make the problem's networks.
+    """The teams that `pack_teams` was given, from anyone's file; their genomes must make the problem's networks.
 
     Raises:
         KeyError, ValueError: a column is missing or damaged, or a genome does not fit.

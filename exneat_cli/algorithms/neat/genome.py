@@ -43,10 +43,8 @@ def number(config: DefaultGenomeConfig, name: str) -> Number:
 class ArrayGenome:
     """A genome that neat-python's reproduction and species take in place of `neat.DefaultGenome`.
 
-    Args:
-        key: its id.
-
     Attributes:
+        key: its id.
         fitness: None until it is known.
         nodes: (N,) of kind `NODE`, sorted; never changed in place once the genome is made.
         connections: (C,) of kind `CONNECTION`, likewise.
@@ -146,8 +144,7 @@ class ArrayGenome:
     def distance(self, other: ArrayGenome, config: DefaultGenomeConfig) -> float:
         """Genetic distance to `other`."""
         disjoint, weight = config.compatibility_disjoint_coefficient, config.compatibility_weight_coefficient
-        distance: float = genetic_distance(self.genes, other.genes, disjoint, weight)
-        return distance
+        return float(genetic_distance(self.genes, other.genes, disjoint, weight))
 
     def size(self) -> tuple[int, int]:
         """Numbers of nodes and of enabled connections."""

@@ -136,13 +136,8 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
 def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, int, int]) -> neat.Config:
     """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
 
-    Its `genome_config` has two attributes more: `positive_start`, and `generator`, which must be set before array
-    genomes are made, since they draw from it.
-
-    Args:
-        settings: see there.
-        population: genomes per generation.
-        shape: numbers of inputs, initial hidden nodes and outputs.
+    `shape` is inputs, initial hidden nodes and outputs. Its `genome_config` has two attributes more: `positive_start`,
+    and `generator`, which must be set before array genomes are made, since they draw from it.
     """
     inputs, hidden, outputs = shape
     config = neat.Config.__new__(neat.Config)

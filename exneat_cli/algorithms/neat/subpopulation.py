@@ -67,11 +67,7 @@ class Subpopulation:
         return genome
 
     def advance(self, fitness: Mapping[int, float]) -> bool:
-        """Replace the generation by the next one; returns whether all species had died out.
-
-        Args:
-            fitness: of every current genome, by id.
-        """
+        """Replace the generation, by the fitness of each genome's id; returns whether all species had died out."""
         for key, genome in self.genomes.items():
             genome.fitness = fitness[key]
         with drawing_from(self._chance):
