@@ -71,7 +71,7 @@ class Problem:
 
 
 State = tuple[dict[str, Any], dict[str, NDArray[Any]]]
-"""A search between two generations, as data: numbers, strings, lists and dicts; and columns of numbers by name."""
+"""A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
 
 
 class Search(ABC):

@@ -55,11 +55,12 @@ class Coevolution(Search):
             seeds = [stream(problem.seed, "evolution", index) for index in range(len(shapes))]
             self._subpopulations = [Subpopulation(*own) for own in zip(configs, seeds, strict=True)]
         else:
+            plain, arrays = state
             self._subpopulations = [
-                Subpopulation.restored(config, (own, state[1]), f"current.{index}")
-                for index, (config, own) in enumerate(zip(configs, state[0]["subpopulations"], strict=True))
+                Subpopulation.restored(config, (own, arrays), f"current.{index}")
+                for index, (config, own) in enumerate(zip(configs, plain["subpopulations"], strict=True))
             ]
-            self._restore(*state)
+            self._restore(plain, arrays)
 
     def ask(self) -> tuple[list[Team], int]:
         """The teams of the next generation; the first call gives the first one."""
@@ -98,7 +99,7 @@ class Coevolution(Search):
         return True
 
     def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
-        """One subpopulation's `ids` in the order of the teams that they join: survivors as `ranked`, then offspring."""
+        """One subpopulation's `ids` as teams take them: survivors in the order of `ranked`, then offspring shuffled."""
         if self._problem.pairing == "index":
             return ids
         there, before = set(ids), set(ranked)
