@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,59 +20,28 @@ from exneat_cli.brains.brain import Brains
 from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
-
-class WiringArrays(NamedTuple):
-    """A plan of M modules with P pins in all, S subpopulations and A actuators, for compiled code.
-
-    Attributes:
-        observation_size: length of what is sensed.
-        inputs: (S,) pins of each module.
-        read_outside: (S,) how many of the first nodes others read: outputs, and the initial hidden nodes where linked.
-        subpopulation: (M,) of each module.
-        first_pin: (M + 1,) the pins of module m are first_pin[m] to first_pin[m + 1].
-        pin_module: (P,) the module that is read; -1 for a sensor.
-        pin_index: (P,) which entry of what is sensed, or which node of the module.
-        pin_delayed: (P,) whether the value of the previous step is read.
-        driver: (A,) the module that sets each actuator; -1 for none.
-        driver_output: (A,) which of its outputs.
-    """
-
-    observation_size: int
-    inputs: NDArray[np.int64]
-    read_outside: NDArray[np.int64]
-    subpopulation: NDArray[np.int64]
-    first_pin: NDArray[np.int64]
-    pin_module: NDArray[np.int64]
-    pin_index: NDArray[np.int64]
-    pin_delayed: NDArray[np.bool_]
-    driver: NDArray[np.int64]
-    driver_output: NDArray[np.int64]
+NETWORK = np.dtype([("inputs", np.int64), ("read_outside", np.int64)])
+"""Of a subpopulation: how many pins a module has, and how many of its first nodes are read from outside: the outputs and,
+where they are linked, the initial hidden nodes."""
+PIN = np.dtype([("index", np.int64), ("module", np.int64), ("delayed", np.bool_)], align=True)
+"""As in `exneat_cli.wiring.Pin`."""
+ACTUATOR = np.dtype([("module", np.int64), ("output", np.int64)])
+"""The module that sets it, -1 for none, and which of its outputs does."""
 
 
 @functools.lru_cache(maxsize=16)
-def wiring_arrays(plan: Plan) -> WiringArrays:
-    """The arrays of `plan`, which must have at least one module."""
-    shapes, read_outside = plan.subpopulation_shapes, np.zeros(len(plan.subpopulation_shapes), np.int64)
-    pins = [pin for module in plan.modules for pin in module.pins]
-    driver = np.full(plan.action_size, -1, np.int64)
-    driver_output = np.zeros(plan.action_size, np.int64)
+def wiring_tables(plan: Plan) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """A plan for compiled code: (S,) networks, (M,) the subpopulation of each module, (P,) all pins, (A,) actuators."""
+    networks = np.zeros(len(plan.subpopulation_shapes), NETWORK)
+    actuators = np.array([(-1, 0)] * plan.action_size, ACTUATOR)
     for m, module in enumerate(plan.modules):
-        read_outside[module.subpopulation] = module.outputs + (module.hidden if plan.hidden_is_linked(m) else 0)
-        drives = list(module.drives)
-        driver[drives] = m
-        driver_output[drives] = range(len(drives))
-    return WiringArrays(
-        observation_size=plan.observation_size,
-        inputs=np.array([inputs for inputs, _, _ in shapes], np.int64),
-        read_outside=read_outside,
-        subpopulation=np.array([module.subpopulation for module in plan.modules], np.int64),
-        first_pin=np.cumsum([0] + [len(module.pins) for module in plan.modules]),
-        pin_module=np.array([pin.module for pin in pins], np.int64),
-        pin_index=np.array([pin.index for pin in pins], np.int64),
-        pin_delayed=np.array([pin.delayed for pin in pins], np.bool_),
-        driver=driver,
-        driver_output=driver_output,
-    )
+        read_outside = module.outputs + (module.hidden if plan.hidden_is_linked(m) else 0)
+        networks[module.subpopulation] = len(module.pins), read_outside
+        for output, actuator in enumerate(module.drives):
+            actuators[actuator] = m, output
+    subpopulation = np.array([module.subpopulation for module in plan.modules], np.int64)
+    pins = [(pin.index, pin.module, pin.delayed) for module in plan.modules for pin in module.pins]
+    return networks, subpopulation, np.array(pins, PIN), actuators
 
 
 def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
@@ -86,8 +55,9 @@ def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward
     Raises:
         ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
     """
-    wiring = wiring_arrays(plan)
-    members = len(wiring.inputs)
+    wiring = wiring_tables(plan)
+    networks, subpopulation, pins, _ = wiring
+    members = len(networks)
     if any(len(team) != members for team in teams):
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
     genomes = [genome for team in teams for genome in team]
@@ -97,10 +67,9 @@ def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward
     first_connection = np.cumsum([0] + [len(genome.connections) for genome in genomes])
     # Room for every gene of every module; what is left over is cut off at the end.
     room_for_nodes, room_for_edges = (
-        int(np.diff(first).reshape(-1, members)[:, wiring.subpopulation].sum())
-        for first in (first_node, first_connection)
+        int(np.diff(first).reshape(-1, members)[:, subpopulation].sum()) for first in (first_node, first_connection)
     )
-    brains = _room(plan, len(teams), room_for_nodes, room_for_edges, len(teams) * len(wiring.pin_index))
+    brains = _room(plan, len(teams), room_for_nodes, room_for_edges, len(teams) * len(pins))
     brains.recurrent[:] = not feed_forward
     _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains)
     return brains.part(0, len(teams))
@@ -129,31 +98,34 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
     Genomes come team by team, each in the order of the subpopulations: genome g has the `nodes` from first_node[g] to
     first_node[g + 1], and `connections` likewise.
     """
-    members, modules = wiring.inputs.size, wiring.subpopulation.size
+    networks, subpopulation, pins, _ = wiring
+    members, modules = networks.size, subpopulation.size
     # Of the networks, gene by gene: rows in the order of evaluation, local indices of nodes and of what is read.
     order, slot_of = np.zeros(nodes.size, np.int64), np.zeros(nodes.size, np.int64)
     source_of = np.zeros(connections.size, np.int64)
     evaluated, slots = np.zeros(members, np.int64), np.zeros(members, np.int64)
     # Of one team: the first slot of each module, and the slot that each pin reads.
-    base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(wiring.pin_index.size, np.int64)
+    base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(pins.size, np.int64)
     for t in range(brains.size.size):
         # 1. One network per genome.
         for s in range(members):
             g = t * members + s
             a, b, c, d = first_node[g], first_node[g + 1], first_connection[g], first_connection[g + 1]
             evaluated[s], slots[s] = _express(
-                wiring, s, nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
+                networks[s], nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
             )
         # 2. One stretch of slots per module.
         _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains)
         # 3. Nodes and edges; modules that share a genome each get a copy.
         brains.first_node[t + 1] = brains.first_node[t]
+        first_pin = 0
         for m in range(modules):
-            s = wiring.subpopulation[m]
+            s = subpopulation[m]
             g = t * members + s
             a, c, d = first_node[g], first_connection[g], first_connection[g + 1]
-            rows, pins = order[a : a + evaluated[s]], pin_slot[wiring.first_pin[m] : wiring.first_pin[m + 1]]
-            _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], pins, base[m], brains)
+            rows, read = order[a : a + evaluated[s]], pin_slot[first_pin : first_pin + networks[s].inputs]
+            _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], read, base[m], brains)
+            first_pin += networks[s].inputs
 
 
 @compiled
@@ -163,17 +135,18 @@ def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type
     Network s has `slots[s]` of them. Overwritten are `base`, (M + 1,), by the first slot of each module, which lie
     behind what is sensed, and `pin_slot`, (P,), by the slot that each pin reads.
     """
-    base[0] = wiring.observation_size
-    for m in range(wiring.subpopulation.size):
-        base[m + 1] = base[m] + slots[wiring.subpopulation[m]]
+    _, subpopulation, pins, actuators = wiring
+    base[0] = brains.observation_size
+    for m in range(subpopulation.size):
+        base[m + 1] = base[m] + slots[subpopulation[m]]
     # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
     # slot still holds the previous step's value anyway. Copies lie behind the modules.
     link, end = brains.first_link[t], base[-1]
     for p in range(pin_slot.size):
-        pin_slot[p] = wiring.pin_index[p]
-        if wiring.pin_module[p] >= 0:
-            pin_slot[p] += base[wiring.pin_module[p]]
-        if feed_forward and wiring.pin_delayed[p]:
+        pin_slot[p] = pins[p].index
+        if pins[p].module >= 0:
+            pin_slot[p] += base[pins[p].module]
+        if feed_forward and pins[p].delayed:
             brains.link_slot[link], brains.link_source[link] = end, pin_slot[p]
             pin_slot[p] = end
             link += 1
@@ -181,9 +154,9 @@ def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type
     brains.first_link[t + 1] = link
     # The last slot stays 0, for actuators that nobody drives.
     brains.size[t] = end + 1
-    for k in range(wiring.driver.size):
-        module = wiring.driver[k]
-        brains.output_slot[t, k] = end if module < 0 else base[module] + wiring.driver_output[k]
+    for k in range(actuators.size):
+        module = actuators[k].module
+        brains.output_slot[t, k] = end if module < 0 else base[module] + actuators[k].output
 
 
 @compiled
@@ -215,13 +188,13 @@ def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, b
 
 
 @compiled
-def _express(wiring, s, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
-    """Make the network of a genome of subpopulation `s`; returns how many nodes it evaluates and how many slots it has.
+def _express(network, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
+    """Make the network of one genome; returns how many nodes it evaluates and how many value slots it has.
 
     Overwritten are `order` by the rows of the nodes to evaluate, in order, and by local indices `slot_of`, of each
     node's value, and `source_of`, of what each connection reads.
     """
-    inputs, read_outside = wiring.inputs[s], wiring.read_outside[s]
+    inputs, read_outside = network.inputs, network.read_outside
     # First the row of the node that each connection reads, or -1 - k for pin k.
     for i in range(connections.size):
         source = connections[i].source
