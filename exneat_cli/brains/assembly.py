@@ -21,8 +21,8 @@ from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
 NETWORK = np.dtype([("inputs", np.int64), ("read_outside", np.int64)])
-"""Of a subpopulation: how many pins a module has, and how many of its first nodes are read from outside: the outputs and,
-where they are linked, the initial hidden nodes."""
+"""Of a subpopulation: how many pins a module has, and how many of its first nodes are read from outside: the outputs
+and, where they are linked, the initial hidden nodes."""
 PIN = np.dtype([("index", np.int64), ("module", np.int64), ("delayed", np.bool_)], align=True)
 """As in `exneat_cli.wiring.Pin`."""
 ACTUATOR = np.dtype([("module", np.int64), ("output", np.int64)])
