@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from exneat_cli.brains import Brains, RandomActions, motionless
+from exneat_cli.brains import Brains, motionless
 from exneat_cli.brains.brain import lay_out
 from exneat_cli.rollouts.cluster import cluster_of, keep_clusters
 from exneat_cli.rollouts.episode import Acting, World
@@ -23,7 +23,7 @@ from exneat_cli.rollouts.sharing import shares_for_threads, short_shares
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import Task
 
-Actors = Brains | Sequence[Brains] | RandomActions
+Actors = Brains | Sequence[Brains] | None
 
 
 class Runner:
@@ -63,7 +63,7 @@ class Runner:
         """Outcomes of every brain (one, if it acts at random) in every episode.
 
         Args:
-            brains: who acts.
+            brains: who acts; None for actions at random, uniform between the task's bounds.
             episodes: the same for all of them.
             moments: whether statistics of what each brain senses are wanted, see `Outcomes`.
 
@@ -82,7 +82,7 @@ class Runner:
             cluster_of(self._executor).run((self._task, self._noise, self._training), acting, episodes, tally)
         return tally.outcomes(self._task)
 
-    def trace(self, brain: Brains | RandomActions, seeds: EpisodeSeeds) -> Trace:
+    def trace(self, brain: Brains | None, seeds: EpisodeSeeds) -> Trace:
         """The path of one episode, and the world that it went through; always runs in this process."""
         acting = self._acting(brain)
         tally = Tally.empty(self._task, 1, 1, moments=False)
@@ -110,9 +110,9 @@ class Runner:
         task = self._task
         actions = len(task.actuator_names)
         low, high = np.zeros(actions), np.full(actions, task.tie_noise)
-        if isinstance(brains, RandomActions):
-            low, high = brains
-            brains = [motionless(task.sensed_size, np.zeros(len(low)))]
+        if brains is None:
+            low, high = task.action_bounds
+            brains = motionless(task.sensed_size, np.zeros(actions))
         brains = brains if isinstance(brains, Brains) else lay_out(brains)
         expected, came = (task.sensed_size, actions), (brains.observation_size, brains.output_slot.shape[1])
         if came != expected:

@@ -85,7 +85,7 @@ def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
 
 
 def _compile(settings: RunSettings, team: Team) -> Brains:
-    return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
+    return assemble(settings.plan, [team.genomes], feed_forward=settings.evolution.feed_forward)
 
 
 def _standing_still(settings: RunSettings) -> Brains:

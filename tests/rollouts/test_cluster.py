@@ -17,7 +17,6 @@ import distributed
 import psutil
 import pytest
 
-from exneat_cli.brains import RandomActions
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Executor, cluster, keep_clusters, settings
 from exneat_cli.rollouts.cluster import cluster_of, run_block, versions
@@ -48,7 +47,7 @@ def _one_cluster_for_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
 @pytest.mark.parametrize("task", [ANT, GeneralMaze(), PLAIN], ids=lambda task: task.name)
 def test_outcomes_and_moments_are_those_of_one_thread(task: Task, workers: int) -> None:
     where = Executor("dask", workers)
-    for brains in (random_brains(13, task), random_brains(1, task), RandomActions(*task.action_bounds)):
+    for brains in (random_brains(13, task), random_brains(1, task), None):
         assert_equal(run(task, brains, where), run(task, brains, SERIAL))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brains, RandomActions, motionless
+from exneat_cli.brains import Brains, motionless
 from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import generator, training_episodes
@@ -82,12 +82,12 @@ def test_an_exploding_episode_gets_the_failure_floor_and_leaves_the_others_alone
     np.testing.assert_array_equal([mixed.fitness[::2], mixed.full_reward[::2]], -7.0)
 
 
-@pytest.mark.parametrize("acting", [motionless(2, np.zeros(1)), motionless(3, np.zeros(2)), RandomActions(*np.eye(2))])
-def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(acting: Any) -> None:
+@pytest.mark.parametrize("acting", [motionless(2, np.zeros(1)), motionless(3, np.zeros(2))])
+def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(acting: Brains) -> None:
     message = r"brains: expected sizes \(3, 1\) of observation and action, got \((2, 1|3, 2)\)"
     with Runner(Drifting(), Noise(), SERIAL, training=False) as runner:
         with pytest.raises(ValueError, match=message):
-            runner.run([acting] if isinstance(acting, Brains) else acting, EPISODES)
+            runner.run([acting], EPISODES)
         with pytest.raises(ValueError, match=message):
             runner.trace(acting, EPISODES[0])
 

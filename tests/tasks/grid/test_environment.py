@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from exneat_cli.brains import RandomActions, linear_fusion
+from exneat_cli.brains import linear_fusion
 from exneat_cli.errors import ConfigError
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import generator, training_episodes
@@ -35,7 +35,7 @@ def test_the_checker_of_gymnasium_has_nothing_to_say(world: str) -> None:
 def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world: str, at_random: bool) -> None:
     env: Any = gymnasium.make(world, **PARAMETERS[world])
     task = WORLDS[world](**PARAMETERS[world])
-    acting = RandomActions(*task.action_bounds) if at_random else linear_fusion(8, 5, task.parts)
+    acting = None if at_random else linear_fusion(8, 5, task.parts)
     located = len(task.trace_columns)
     place = np.zeros(located)
     with Runner(task, Noise(), Executor("serial"), training=False) as runner:
