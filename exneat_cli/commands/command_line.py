@@ -22,12 +22,11 @@ import hydra
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, Quote, QuotedString
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
 import exneat_cli
-from exneat_cli.commands.hydra_messages import in_words
 from exneat_cli.errors import ConfigError, ExneatError
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
@@ -40,34 +39,21 @@ _LONGEST = 300
 
 @dataclass(frozen=True)
 class CommandLine:
-    """What was typed after ``exneat``.
+    """What was typed after ``exneat``."""
 
-    Attributes:
-        words: all of it, and ``exneat`` before, for manifests.
-        primary: the YAML file that the composition starts from, if from any.
-        directories: where YAML files are looked for, in this order.
-        settings: key=value, as Hydra's composition takes them.
-        launcher: the same for Hydra's launcher.
-        multirun: whether settings with several values are to be gone through.
-        shown: ``help`` or ``job`` if that is all that is asked for, else empty.
-    """
-
-    words: tuple[str, ...]
-    primary: str | None
-    directories: tuple[Path, ...]
-    settings: tuple[str, ...]
-    launcher: tuple[str, ...]
-    multirun: bool
-    shown: str
+    words: tuple[str, ...]  # all of it, and exneat before, for manifests
+    primary: str | None  # the YAML file that the composition starts from, if from any
+    directories: tuple[Path, ...]  # where YAML files are looked for, in this order
+    settings: tuple[str, ...]  # key=value, as Hydra's composition takes them
+    launcher: tuple[str, ...]  # the same for Hydra's launcher
+    multirun: bool  # whether settings with several values are to be gone through
+    shown: str  # help or job if that is all that is asked for, else empty
 
     def compose(self, *keys: str) -> dict[str, Any]:
-        """Compose the settings with the YAML files, as dicts, lists, numbers and strings.
-
-        Args:
-            keys: those that are wanted; without any, all are.
+        """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
 
         Raises:
-            ExneatError: they do not fit together, or a value refers to something that is not there.
+            ExneatError: they do not fit together, or a key or what a value refers to is not there.
         """
         with self.composed() as config:
             try:
@@ -75,6 +61,9 @@ class CommandLine:
                 plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
             except OmegaConfBaseException as error:
                 raise ExneatError(in_words(error, self.directories)) from error
+        for key in keys:
+            if key not in plain:
+                raise ExneatError(f"{key}: is missing")
         return {str(key): value for key, value in plain.items()}
 
     @contextlib.contextmanager
@@ -85,8 +74,7 @@ class CommandLine:
             ExneatError: they do not fit together.
         """
         first, *others = map(str, self.directories)
-        places = ",".join(quoted(f"file://{directory}") for directory in others)
-        overrides = [*self.settings, f"hydra.searchpath=[{places}]"]
+        overrides = [*self.settings, f"hydra.searchpath={as_written([f'file://{directory}' for directory in others])}"]
         with contextlib.ExitStack() as ending:
             try:
                 ending.enter_context(hydra.initialize_config_dir(first, job_name="exneat", version_base="1.3"))
@@ -251,3 +239,30 @@ def _parsed(text: str) -> tuple[str, Override]:
         with contextlib.suppress(HydraException):
             return readable, parser.parse_override(readable)
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")
+
+
+def in_words(error: BaseException, directories: Sequence[Path]) -> str:
+    """What Hydra, OmegaConf or YAML say, in one or two lines that name the file, the setting, or the known options."""
+    error = error if str(error) else error.__cause__ or error
+    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        group, _, option = str(error.missing_cfg_file).rpartition("/")
+        files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
+        known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
+        return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: cannot be read as YAML: {error.problem}"
+    if isinstance(error, UnicodeDecodeError):
+        paths = (path for directory in directories for path in directory.rglob("*.yaml"))
+        place = next((path for path in paths if error.object in path.read_bytes()), "a YAML file")
+        return f"{place}: expected UTF-8 text, got the byte {error.object[error.start]:#04x}"
+    if isinstance(error, RecursionError):
+        return "a YAML file leads back to itself through its defaults, or values do through ${...}"
+    cause = error.__cause__
+    if isinstance(cause, ConfigKeyError | ConfigAttributeError) and cause.parent_node is not None:
+        return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
+    first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
+    if key := getattr(error, "full_key", None):
+        first = f"{key}: {first}"
+    if isinstance(error, InterpolationKeyError):
+        first += "\n  a YAML file of your own that sets it begins with # @package _global_"
+    return first

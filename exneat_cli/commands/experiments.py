@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,7 @@ import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from exneat_cli.commands.command_line import CommandLine, as_written, read_setting, shipped_directory
-from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
 from exneat_cli.commands.jobs import BUDGETS, Job, read_job
 from exneat_cli.errors import (
     ConfigError,
@@ -34,14 +34,7 @@ _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "h
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the things compared.
-
-    Attributes:
-        label: for legends and tables.
-        settings: by dotted name, as on the command line.
-        runs: number of seeds; None takes the experiment's.
-        swept: whether its runs are tested for robustness.
-    """
+    """One of the things compared; without `runs` it has as many seeds as the experiment says."""
 
     label: str
     settings: Mapping[str, Any]
@@ -51,7 +44,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Condition:
-    """One training condition: its label, settings, and the robustness sweeps that its runs go through."""
+    """One training condition, and the robustness sweeps that the runs of all variants but unswept ones go through."""
 
     label: str
     settings: Mapping[str, Any]
@@ -60,15 +53,9 @@ class Condition:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What experiments/<name>.yaml says.
+    """What experiments/<name>.yaml says; its first variant is the one that the others are compared with.
 
-    Attributes:
-        name: of the file.
-        claim: what it is to show.
-        settings: of all its runs.
-        variants: by name; the others are compared with the first.
-        conditions: by name.
-        runs: budget -> number of seeds of each variant, 0, 1, 2, ...
+    Settings are by dotted name, as on the command line; `runs` are the numbers of seeds 0, 1, 2, ... by budget.
     """
 
     name: str
@@ -85,10 +72,7 @@ def experiment_names() -> list[str]:
 
 
 def read_experiment(name: object) -> Experiment:
-    """Read the experiment of that name, or the one in a YAML file of the user's own.
-
-    Args:
-        name: one of `experiment_names`, or a path that ends in ``.yaml``.
+    """Read one of `experiment_names`, or a YAML file of the user's own.
 
     Raises:
         ExneatError: there is no such experiment, or its file is damaged or makes no sense.
@@ -166,16 +150,9 @@ def _flat(values: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
 
 
 def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
-    """Plan every run of an experiment, condition by condition and variant by variant.
+    """Plan every run of an experiment: jobs called ``<condition>/<variant>/<seed>``, in this order.
 
-    Args:
-        experiment: what is compared.
-        budget: ``paper``, ``quick`` or ``smoke``.
-        line: its settings are the user's own for all runs, and win.
-        others: those that are none of the runs.
-
-    Returns:
-        Jobs that are called ``<condition>/<variant>/<seed>``.
+    The user's own settings in `line` are for all runs, and win; those called `others` are none of the runs.
 
     Raises:
         ExneatError: settings make no sense, in at least one of the runs.
@@ -183,34 +160,26 @@ def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Se
     if budget not in experiment.runs:
         raise ConfigError("budget", f"one that {experiment.name} has runs for, {', '.join(experiment.runs)}", budget)
     jobs: list[Job] = []
-    for condition in experiment.conditions:
-        for variant in experiment.variants:
-            try:
-                jobs += _jobs(experiment, condition, variant, budget, line, others)
-            except ExneatError as error:
-                raise ExneatError(f"{experiment.name}, {condition}, {variant}: {error}") from error
+    for (place, condition), (name, variant) in product(experiment.conditions.items(), experiment.variants.items()):
+        settings = {
+            **experiment.settings,
+            **condition.settings,
+            **variant.settings,
+            "sweep": (condition.sweeps if variant.swept else None) or "none",
+            "name": f"{experiment.name}-{place}-{budget}",
+        }
+        try:
+            texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
+            composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
+            first = read_job("", composed, others)
+            for k in range(variant.runs or experiment.runs[budget]):
+                seeded = replace(first.settings, seed=first.settings.seed + k)
+                jobs.append(replace(first, name=f"{place}/{name}/{seeded.seed}", settings=seeded))
+        except ExneatError as error:
+            raise ExneatError(f"{experiment.name}, {place}, {name}: {error}") from error
     places: dict[Path, Job] = {}
     for job in jobs:
         twin = places.setdefault(job.settings.directory.path, job)
         if twin is not job:
             raise ExneatError(f"{experiment.name}: {twin.name} and {job.name} are the same run; variants must differ")
     return jobs
-
-
-def _jobs(
-    experiment: Experiment, condition: str, variant: str, budget: str, line: CommandLine, others: Sequence[str]
-) -> Iterable[Job]:
-    chosen, where = experiment.variants[variant], experiment.conditions[condition]
-    settings = {
-        **experiment.settings,
-        **where.settings,
-        **chosen.settings,
-        "sweep": (where.sweeps if chosen.swept else None) or "none",
-        "name": f"{experiment.name}-{condition}-{budget}",
-    }
-    texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
-    composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
-    first = read_job("", composed, others)
-    for k in range(chosen.runs or experiment.runs[budget]):
-        seeded = replace(first.settings, seed=first.settings.seed + k)
-        yield Job(f"{condition}/{variant}/{seeded.seed}", seeded, first.sweeps)

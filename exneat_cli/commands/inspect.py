@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
@@ -75,7 +77,7 @@ def _links(champion: Champion, module: Module) -> Iterable[str]:
 
 
 def _list(output: Path) -> None:
-    runs = list(find_runs(output))
+    runs = find_runs(output)
     if not runs:
         print(f"No runs below {output}; exneat train makes one.")
         return
@@ -98,10 +100,5 @@ def _status(run: RunDirectory, manifest: Manifest) -> str:
 
 def _ranges(indices: Sequence[int]) -> str:
     """Whole numbers in words, e.g. ``5-6, 19-20``; order is kept where it is not ascending."""
-    parts: list[list[int]] = []
-    for index in indices:
-        if parts and index == parts[-1][-1] + 1:
-            parts[-1].append(index)
-        else:
-            parts.append([index])
+    parts = np.split(np.array(indices, int), np.flatnonzero(np.diff(indices) != 1) + 1) if indices else []
     return ", ".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)
