@@ -144,7 +144,13 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
         raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
-    directories = _search_path(flags.config_path, flags.config_dir)
+    shipped = shipped_directory("conf")
+    for own in flags.config_dir:
+        for path in own.rglob("*.yaml"):
+            name = path.relative_to(own)
+            if (shipped / name).exists():
+                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+    directories = (*filter(None, [flags.config_path]), shipped, *flags.config_dir)
     read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
     return CommandLine(
         words=("exneat", command, *arguments),
@@ -180,17 +186,6 @@ def _directory(text: str) -> Path:
         came = "a file" if directory.exists() else "nothing"
         raise ExneatError(f"{text}: expected a directory with YAML files, got {came}")
     return directory
-
-
-def _search_path(start: Path | None, own: Sequence[Path]) -> tuple[Path, ...]:
-    """Where YAML files are looked for, in this order: where the composition starts, exneat's own, and a user's own."""
-    shipped = shipped_directory("conf")
-    for directory in own:
-        for path in directory.rglob("*.yaml"):
-            name = path.relative_to(directory)
-            if (shipped / name).exists():
-                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
-    return (*([] if start is None else [start]), shipped, *own)
 
 
 def _is_hydras(text: str) -> bool:

@@ -44,24 +44,21 @@ def _show(run: RunDirectory) -> None:
     subpopulations = len(champion.plan.subpopulation_shapes)
     print(f"{champion.variant}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
     for module in champion.plan.modules:
-        _show_module(champion, module)
+        x, y = module.position
+        print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
+        print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
+        for link in _links(champion, module):
+            print(f"  reads    {link}")
+        drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
+        print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
+        genome = champion.genomes[module.subpopulation]
+        sizes = (
+            f"{len(module.pins)} inputs, {len(genome.nodes) - module.outputs} hidden nodes, {module.outputs} outputs"
+        )
+        enabled = sum(connection.enabled for connection in genome.connections)
+        print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
     test = champion.scores.test
     print(f"test: fitness {test.fitness_mean:.4g} (sd {test.fitness_std:.3g}), {test.episodes} episodes")
-
-
-def _show_module(champion: Champion, module: Module) -> None:
-    genome = champion.genomes[module.subpopulation]
-    hidden = len(genome.nodes) - module.outputs
-    enabled = sum(connection.enabled for connection in genome.connections)
-    x, y = module.position
-    print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
-    print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
-    for line in _links(champion, module):
-        print(f"  reads    {line}")
-    drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
-    print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
-    sizes = f"{len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs"
-    print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
 
 
 def _links(champion: Champion, module: Module) -> Iterable[str]:

@@ -30,9 +30,8 @@ def run(line: CommandLine) -> int:
     jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
     pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
     before = len(jobs) - len(pending)
-    print(
-        f"{experiment.name}, budget {asked['budget']}: {len(jobs)} runs, {before} of them finished before", flush=True
-    )
+    counted = f"{len(jobs)} runs, {before} of them finished before"
+    print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
     reasons = [""] * len(pending)
     try:
         if pending:
