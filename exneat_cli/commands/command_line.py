@@ -31,8 +31,6 @@ from exneat_cli.errors import ConfigError, ExneatError
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
-_OF_LISTS = ("sweep",)
-"""Groups of which several options may be chosen at once."""
 _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
 _LONGEST = 300
 
@@ -118,16 +116,11 @@ def shipped_directory(name: str) -> Path:
     return packaged if packaged.is_dir() else package.parent / name
 
 
-def quoted(text: str) -> str:
-    """The text in quotes, so that Hydra's grammar takes it as it stands."""
-    return QuotedString(text=text, quote=Quote.single).with_quotes()
-
-
 def as_written(value: object) -> str:
-    """A value as Hydra's grammar writes it."""
+    """A value as Hydra's grammar writes it; text stands in quotes, so that it is taken as it is."""
     if isinstance(value, list):
         return f"[{','.join(map(as_written, value))}]"
-    return quoted(value) if isinstance(value, str) else json.dumps(value)
+    return QuotedString(value, Quote.single).with_quotes() if isinstance(value, str) else json.dumps(value)
 
 
 def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
@@ -219,7 +212,7 @@ def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = Fal
         return f"++{readable.lstrip('+')}"
     if not override.is_sweep_override():
         value = override.value()
-        if isinstance(value, list) and key not in _OF_LISTS:
+        if isinstance(value, list) and key != "sweep":  # of which several may be chosen at once
             raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
         if not isinstance(value, str | list):
             raise ConfigError(key, "the name of an option", value)
@@ -230,7 +223,7 @@ def _parsed(text: str) -> tuple[str, Override]:
     """A setting that Hydra's grammar reads, and what it reads."""
     parser = OverridesParser.create()
     key, separator, value = text.partition("=")
-    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else (text,):
+    for readable in (text, f"{key}={as_written(os.path.expanduser(value))}") if separator else (text,):
         with contextlib.suppress(HydraException):
             return readable, parser.parse_override(readable)
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")

@@ -14,8 +14,6 @@ from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_fi
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
 _SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings))
-_NO_SETTINGS = ("budget", "budgets", "sweep", "sweeps")
-"""What a composed configuration holds besides settings of the run."""
 _SPENT = ("generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes")
 _OF_SWEEPS = ("parameter", "label", "levels")
 
@@ -72,7 +70,7 @@ def read_job(name: str, plain: Mapping[str, Any], others: Sequence[str] = ()) ->
     Raises:
         ExneatError: a key is unknown or missing, a value is of the wrong type or out of range, or a sweep does not fit.
     """
-    check_keys("", plain, (*_SETTINGS, *_NO_SETTINGS, *others))
+    check_keys("", plain, (*_SETTINGS, "budget", "budgets", "sweep", "sweeps", *others))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)
         check_keys(f"budgets.{budget}.", check_section(f"budgets.{budget}", spent), _SPENT)

@@ -14,8 +14,8 @@ from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
-from exneat_cli.commands.experiments import Experiment, experiment_names, plan_jobs, read_experiment
 from exneat_cli.commands.jobs import BUDGETS
+from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment
 from exneat_cli.errors import ExneatError, check_choice, check_text
 from exneat_cli.records import RunDirectory
 from exneat_cli.tasks import HasFullReward

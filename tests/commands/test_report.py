@@ -10,7 +10,7 @@ import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
 from exneat_cli.commands.command_line import shipped_directory
-from exneat_cli.commands.experiments import experiment_names, read_experiment
+from exneat_cli.commands.sweep import experiment_names, read_experiment
 from exneat_cli.main import main
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
