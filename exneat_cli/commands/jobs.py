@@ -34,10 +34,6 @@ class Job:
         except ExneatError:
             return False
 
-    def is_drawn(self) -> bool:
-        """Whether all figures of the finished run are there."""
-        return not missing_figures(self.settings.directory, swept=bool(self.sweeps))
-
     def do(self, progress: Progress, command: Sequence[str], *, go_on: bool) -> Finished:
         """Train, test and draw, as far as that is not done yet.
 
@@ -59,9 +55,40 @@ class Job:
             tested = run_robustness(
                 directory, self.sweeps, episodes=self.episodes, executor=executor, progress=progress
             )
-        labels = {sweep.name: sweep.label for sweep in self.sweeps}
-        draw_what_is_missing(directory, self.settings.task.fitness_name, labels)
+        self.draw(directory)
         return tested
+
+    def missing_figures(self, directory: RunDirectory) -> list[str]:
+        """Names of the figures that the finished run has data for, but no picture; of robustness also an older one."""
+        data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
+        plots = directory.plots
+        missing = [name for name, path in data.items() if path.exists() and not (plots / f"{name}.svg").exists()]
+        if self.sweeps and directory.robustness.exists():
+            picture = plots / "robustness.svg"
+            if not picture.exists() or picture.stat().st_mtime < directory.robustness.stat().st_mtime:  # it may grow
+                missing.append("robustness")
+        return missing
+
+    def draw(self, directory: RunDirectory) -> None:
+        """Draw the figures that are missing.
+
+        Raises:
+            ExneatError: another process holds the directory, or a figure cannot be written.
+        """
+        if not self.missing_figures(directory):
+            return
+        from exneat_cli.analysis import draw_network, draw_path, draw_robustness, draw_training
+
+        fitness, labels = self.settings.task.fitness_name, {sweep.name: sweep.label for sweep in self.sweeps}
+        draw = {
+            "training": lambda: draw_training(directory, fitness),
+            "path": lambda: draw_path(directory),
+            "network": lambda: draw_network(directory),
+            "robustness": lambda: draw_robustness(directory, labels, fitness),
+        }
+        with directory.held():  # nobody may change the data between reading and drawing
+            for name in self.missing_figures(directory):
+                draw[name]()
 
 
 def read_job(name: str, plain: Mapping[str, Any], others: Sequence[str] = ()) -> Job:
@@ -103,37 +130,3 @@ def with_sweeps(name: str, settings: RunSettings, plain: Mapping[str, Any]) -> J
     episodes = common.get("episodes", 1)
     check_sweeps(settings, sweeps, episodes)
     return Job(name, settings, tuple(sweeps), episodes)
-
-
-def missing_figures(directory: RunDirectory, *, swept: bool) -> list[str]:
-    """Names of the figures that a finished run has data for, but no picture; of robustness also an older one."""
-    data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
-    missing = [name for name, path in data.items() if path.exists() and not (directory.plots / f"{name}.svg").exists()]
-    if swept and directory.robustness.exists():
-        picture = directory.plots / "robustness.svg"
-        if not picture.exists() or picture.stat().st_mtime < directory.robustness.stat().st_mtime:  # which may grow
-            missing.append("robustness")
-    return missing
-
-
-def draw_what_is_missing(directory: RunDirectory, fitness_name: str, labels: Mapping[str, str]) -> None:
-    """Draw training, path, network and robustness, as far as a finished run has data for them.
-
-    Axes of fitness are called `fitness_name`, those of robustness sweeps as `labels` say by the sweeps' names.
-
-    Raises:
-        ExneatError: another process holds the directory, or a figure cannot be written.
-    """
-    if not missing_figures(directory, swept=bool(labels)):
-        return
-    from exneat_cli.analysis import draw_network, draw_path, draw_robustness, draw_training
-
-    draw = {
-        "training": lambda: draw_training(directory, fitness_name),
-        "path": lambda: draw_path(directory),
-        "network": lambda: draw_network(directory),
-        "robustness": lambda: draw_robustness(directory, labels, fitness_name),
-    }
-    with directory.held():  # nobody may change the data between reading and drawing
-        for name in missing_figures(directory, swept=bool(labels)):
-            draw[name]()

@@ -202,7 +202,7 @@ def run(line: CommandLine) -> int:
         raise ConfigError("experiment", "a name or a YAML file, e.g. experiment=track_maze", asked["experiment"])
     experiment = read_experiment(asked["experiment"])
     jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
-    pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
+    pending = [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
     before = len(jobs) - len(pending)
     counted = f"{len(jobs)} runs, {before} of them finished before"
     print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
