@@ -50,13 +50,11 @@ class Job:
         Raises:
             ExneatError: another process holds the directory, it is damaged, or a figure cannot be written.
         """
-        tested = 0
+        done = 0
         if self.sweeps:
-            tested = run_robustness(
-                directory, self.sweeps, episodes=self.episodes, executor=executor, progress=progress
-            )
+            done = run_robustness(directory, self.sweeps, episodes=self.episodes, executor=executor, progress=progress)
         self.draw(directory)
-        return tested
+        return done
 
     def missing_figures(self, directory: RunDirectory) -> list[str]:
         """Names of the figures that the finished run has data for, but no picture; of robustness also an older one."""

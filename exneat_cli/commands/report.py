@@ -30,7 +30,7 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, there are no runs, or the one thing asked for lacks runs.
     """
-    asked = line.compose("budget", "output", *_OWN)
+    asked = line.compose("experiment", "budget", "only", "axis", "output")
     check_choice("axis", asked["axis"], AXES)
     check_text("output", asked["output"], "a directory")
     own = None if asked["experiment"] is None else read_experiment(asked["experiment"])
