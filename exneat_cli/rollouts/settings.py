@@ -99,6 +99,7 @@ class Sweep:
         name: e.g. ``sensor_noise``.
         parameter: the setting, below ``task.`` or ``noise.``.
         levels: its values, all different.
+        label: of its axis in figures.
 
     Raises:
         ConfigError: there are no levels, or one is no finite number or comes twice.
@@ -107,6 +108,7 @@ class Sweep:
     name: str
     parameter: str
     levels: tuple[float, ...]
+    label: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "levels", tuple(self.levels))
