@@ -38,15 +38,9 @@ class EpisodeSeeds(NamedTuple):
 
 
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
-    """Seed of one stream.
+    """Seed of one stream of a run with seed `root`; `purpose` is a key of `STREAMS`.
 
-    Args:
-        root: the run's seed, at least 0.
-        purpose: a key of `STREAMS`.
-        indices: which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
-
-    Raises:
-        KeyError: `purpose` is not a stream.
+    `indices` say which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
     """
     return SeedSequence(root, spawn_key=(STREAMS[purpose], *indices))
 
@@ -58,12 +52,9 @@ def generator(seed: SeedSequence) -> Generator:
 
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
     """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
+    purposes = ("world", "sensor_noise", "action_ties")
     return [
-        EpisodeSeeds(
-            world=stream(root, "world", generation, episode),
-            sensor_noise=stream(root, "sensor_noise", generation, episode),
-            actions=stream(root, "action_ties", generation, episode),
-        )
+        EpisodeSeeds(*(stream(root, purpose, generation, episode) for purpose in purposes))
         for episode in range(first, first + count)
     ]
 

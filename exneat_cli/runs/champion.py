@@ -101,8 +101,8 @@ def _champion(settings: RunSettings, team: Team, scores: Scores) -> Champion:
 
 
 def _write_trace(settings: RunSettings, directory: RunDirectory, trace: Trace) -> None:
-    columns = ("step", *settings.task.trace_columns, *settings.task.terms)
-    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.steps.tolist())])
-    if trace.tiles is not None:
-        tiles = [(*place, *trace.tiles[place].tolist()) for place in np.ndindex(trace.tiles.shape[:2])]
-        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), tiles)
+    columns, (steps, tiles) = ("step", *settings.task.trace_columns, *settings.task.terms), trace
+    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(steps.tolist())])
+    if tiles is not None:
+        rows = [(*place, *tiles[place].tolist()) for place in np.ndindex(tiles.shape[:2])]
+        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), rows)

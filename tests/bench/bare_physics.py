@@ -82,7 +82,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
     recordings = [record(TASK, simulation, lay_out(brains), b) for b in range(len(brains))]
     with open_runner(threads=1) as runner:
         for brain, recording in zip(brains, recordings, strict=True):
-            check_x("step by step", recording.final_x, float(runner.trace(brain, seeds).steps[-1, 0]))
+            check_x("step by step", recording.final_x, float(runner.trace(brain, seeds)[0][-1, 0]))
         pairs = [
             Pair(
                 partial(seconds_of, partial(runner.run, [brain], [seeds])), partial(_replay_one, simulation, recording)
