@@ -74,6 +74,5 @@ def generator_in(state: Mapping[str, Any]) -> Generator:
         KeyError, OverflowError, TypeError, ValueError: it is no such state.
     """
     bit_generator = PCG64(0)
-    given: Any = dict(state)
-    bit_generator.state = given
+    bit_generator.state = dict(state)  # type: ignore[assignment]
     return Generator(bit_generator)

@@ -129,22 +129,16 @@ def _add_moments(sensed, t, means, squares):  # type: ignore[no-untyped-def]
 
 
 @compiled_lean
-def _sense_readings(world, readings, sensed):  # type: ignore[no-untyped-def]
-    """Leave it at the readings, which lie where what is sensed does."""
-
-
-@compiled_lean
-def _drive_as_told(world, action):  # type: ignore[no-untyped-def]
-    """Leave the action as it is."""
+def _unchanged(world, *values):  # type: ignore[no-untyped-def]
+    """Leave the readings, which lie where what is sensed does, or the action as they are, or locate nothing."""
 
 
 def _loop_of(simulation: Simulation, task: str) -> Callable[..., Any]:
     """The loop for one kind of world, whose task has this name: compiled if the world is, else plain Python."""
     names = ("reset", "rewind", "observe", "sense", "drive", "step", "locate")
-    defaults: dict[str, Any] = {"sense": _sense_readings, "drive": _drive_as_told}
-    if not simulation.compiled:  # its world may be something that compiled code cannot take
-        defaults = {name: function.py_func for name, function in defaults.items()}
-    functions = {name: getattr(simulation, name) or defaults[name] for name in names}
+    # The world of plain functions may be something that compiled code cannot take.
+    default = _unchanged if simulation.compiled else _unchanged.py_func  # type: ignore[attr-defined]
+    functions = {name: getattr(simulation, name) or default for name in names}
     return _compiled_loop(task, **functions) if simulation.compiled else with_functions(_episodes, task, **functions)
 
 

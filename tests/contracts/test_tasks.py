@@ -37,7 +37,8 @@ def live(task: Task, simulation: Simulation) -> list[list[float]]:
         place = np.full(len(task.trace_columns), np.nan)
         simulation.observe(simulation.world, observation)
         status = simulation.step(simulation.world, rng.uniform(*task.action_bounds), terms)
-        simulation.locate(simulation.world, place)
+        if simulation.locate is not None:
+            simulation.locate(simulation.world, place)
         seen.append([*observation, *terms, *place, float(status)])
     return seen
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from exneat_cli.compiling import compiled
 from exneat_cli.errors import check_choice, check_real
 from exneat_cli.tasks.grid.maze import FURTHEST, Maze, MazeTask, add_cue_noise, begin
-from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS
+from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, draw_tiles
 from exneat_cli.tasks.task import Simulation
 
 
@@ -54,7 +54,7 @@ class GeneralMaze(MazeTask):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new maze."""
-        return self._open(reset, cues_removed=self.cues_removed, walls_removed=self.walls_removed)
+        return self._open(reset)
 
 
 @compiled
@@ -75,7 +75,9 @@ def reset(maze: Maze, rng: Generator) -> None:
             if maze.path[row, column] == 1:
                 maze.signals[:, row, column] = (furthest - maze.distances[row, column]) / furthest / 2.0
     # Tiles that lost their cue get noise as all others do.
-    remove_cues(maze, rng)
+    silent = draw_tiles(maze.path, int(np.rint(maze.cues_removed * maze.path.sum())), rng)
+    for k in range(silent.shape[0]):
+        maze.signals[:, silent[k, 0], silent[k, 1]] = 0.0
     add_cue_noise(maze, rng)
 
 
@@ -108,37 +110,11 @@ def carve(path: NDArray[np.int64], rng: Generator) -> None:
 @compiled
 def remove_walls(maze: Maze, rng: Generator) -> None:
     """Open a share of the walls that stand between two cells."""
-    if maze.walls_removed == 0.0:  # draws nothing then
-        return
     # A wall between two cells has one odd coordinate; where both are even stands a pillar.
     walls, size = np.zeros_like(maze.path), maze.path.shape[0]
     for row in range(1, size - 1):
         for column in range(1 + row % 2, size - 1, 2):
             walls[row, column] = 1 - maze.path[row, column]
-    chosen = draw_share(walls, maze.walls_removed, rng)
-    for k in range(chosen.shape[0]):
-        maze.path[chosen[k, 0], chosen[k, 1]] = 1
-
-
-@compiled
-def remove_cues(maze: Maze, rng: Generator) -> None:
-    """Silence both channels on a share of the path tiles."""
-    if maze.cues_removed == 0.0:  # draws nothing then
-        return
-    chosen = draw_share(maze.path, maze.cues_removed, rng)
-    for k in range(chosen.shape[0]):
-        maze.signals[:, chosen[k, 0], chosen[k, 1]] = 0.0
-
-
-@compiled
-def draw_share(eligible: NDArray[np.int64], share: float, rng: Generator) -> NDArray[np.int64]:
-    """(chosen, 2) rows and columns of a random share of the tiles that are not 0 in `eligible`, (N, N)."""
-    tiles = np.argwhere(eligible)
-    count = tiles.shape[0]
-    chosen = int(np.rint(share * count))
-    # The first steps of a Fisher-Yates shuffle.
-    for k in range(chosen):
-        other = k + int(rng.integers(0, count - k))
-        for axis in range(2):
-            tiles[k, axis], tiles[other, axis] = tiles[other, axis], tiles[k, axis]
-    return tiles[:chosen]
+    opened = draw_tiles(walls, int(np.rint(maze.walls_removed * walls.sum())), rng)
+    for k in range(opened.shape[0]):
+        maze.path[opened[k, 0], opened[k, 1]] = 1

@@ -22,17 +22,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
 from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
-from exneat_cli.tasks.grid.world import (
-    CHANNELS,
-    COLUMN,
-    COLUMN_STEPS,
-    ROW,
-    ROW_STEPS,
-    STEPS,
-    GridTask,
-    move,
-    sense_neighbours,
-)
+from exneat_cli.tasks.grid.world import CHANNELS, COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, GridTask, move, observe
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 
 SPARE_STEPS = 2
@@ -59,11 +49,14 @@ class Maze(NamedTuple):
 
 
 class MazeTask(GridTask):
-    """A maze with parameters that both kinds have; the dataclasses that derive from it declare them."""
+    """A maze with the parameters of both kinds; the dataclasses that derive from it declare those that they have."""
 
     size: int
     cue_noise: float
     fitness: str
+    gap: int = 0
+    cues_removed: float = 0.0
+    walls_removed: float = 0.0
 
     terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
     trace_columns: ClassVar[tuple[str, ...]] = ("row", "column", "goal_row", "goal_column")
@@ -85,9 +78,7 @@ class MazeTask(GridTask):
         check_real("task.cue_noise", self.cue_noise, 0.0)
         check_choice("task.fitness", self.fitness, list(TIME_SHARES))
 
-    def _open(
-        self, reset: Callable[..., Any], *, gap: int = 0, cues_removed: float = 0.0, walls_removed: float = 0.0
-    ) -> Simulation:
+    def _open(self, reset: Callable[..., Any]) -> Simulation:
         tiles = (self.size, self.size)
         maze = Maze(
             path=np.zeros(tiles, np.int64),
@@ -98,9 +89,9 @@ class MazeTask(GridTask):
             time_share=TIME_SHARES[self.fitness],
             # A whole number would be another type to the compiler, and compiled apart.
             cue_noise=float(self.cue_noise),
-            gap=gap,
-            cues_removed=float(cues_removed),
-            walls_removed=float(walls_removed),
+            gap=self.gap,
+            cues_removed=float(self.cues_removed),
+            walls_removed=float(self.walls_removed),
         )
         return Simulation(maze, reset, rewind, observe, step, locate)
 
@@ -160,12 +151,6 @@ def rewind(maze: Maze) -> None:
     """Put the agent back to its start."""
     agent, goal = maze.agent, maze.goal
     agent[ROW], agent[COLUMN], agent[STEPS] = goal[START_ROW], goal[START_COLUMN], 0
-
-
-@compiled_lean
-def observe(maze: Maze, observation: NDArray[np.float64]) -> None:
-    """Write the cues of the four neighbours."""
-    sense_neighbours(maze.signals, maze.agent, observation)
 
 
 @compiled_lean

@@ -64,6 +64,9 @@ class Foraging(GridTask):
     terms: ClassVar[tuple[str, ...]] = ("caught",)
     channels: ClassVar[int] = 1
     """On which each prey emits."""
+    p_m = 0.0
+    motion = "brownian"
+    """Prey never move here; no settings, see `Hunting`."""
 
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, ["foraging" if self.channels == 1 else "hunting"])
@@ -99,9 +102,6 @@ class Foraging(GridTask):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new field."""
-        return self._open(motion=0.0, levy=False)
-
-    def _open(self, *, motion: float, levy: bool) -> Simulation:
         tiles, prey = (self.size + 2, self.size + 2), self.n_prey
         field = Field(
             path=np.zeros(tiles, np.int64),
@@ -116,8 +116,8 @@ class Foraging(GridTask):
             channels=self.channels,
             emission=float(self.p_e),
             keep=1.0 - self.p_c,
-            motion=float(motion),
-            levy=levy,
+            motion=float(self.p_m),
+            levy=self.motion == "levy",
         )
         return Simulation(field, reset, rewind, observe, step, locate)
 
@@ -157,10 +157,6 @@ class Hunting(Foraging):
         super().__post_init__()
         check_real("task.p_m", self.p_m, 0.0, 1.0)
         check_choice("task.motion", self.motion, MOTIONS)
-
-    def open(self, *, training: bool) -> Simulation:
-        """Open a new field."""
-        return self._open(motion=self.p_m, levy=self.motion == "levy")
 
 
 @compiled

@@ -51,7 +51,7 @@ class TrackMaze(MazeTask):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new track."""
-        return self._open(reset, gap=self.gap)
+        return self._open(reset)
 
 
 @compiled

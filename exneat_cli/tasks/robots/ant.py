@@ -151,14 +151,8 @@ class AntTask(Task):
         return self.open_disturbed(training=training, reset_scale=RESET_SCALE)
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
-        """Open a new world.
-
-        Args:
-            training: whether an episode ends once the body makes no progress.
-            reset_scale: size of the noise on the initial pose.
-        """
+        """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
         mujoco_library.load_library()
-        mujoco_library.silence_warnings()
         model = _model()
         data = mujoco.MjData(model)
         world = dynamics.AntWorld(

@@ -45,9 +45,5 @@ def load_library() -> None:
     missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
     if missing:
         raise ExneatError(f"MuJoCo: {libraries[0].name} has no {', '.join(missing)}\n  {fix}")
-
-
-@functools.cache
-def silence_warnings() -> None:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory; its counters still count."""
+    # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
     mujoco.set_mju_user_warning(lambda message: None)
