@@ -8,7 +8,7 @@ episodes grow from a constant instead of the run's seed: every run and every var
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from numpy.random import PCG64, Generator, SeedSequence
 
@@ -29,12 +29,8 @@ SHARED_ROOT = 0
 """Root of the validation and test streams, which do not depend on the run's seed."""
 
 
-class EpisodeSeeds(NamedTuple):
-    """What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
-
-    world: SeedSequence
-    sensor_noise: SeedSequence
-    actions: SeedSequence
+EpisodeSeeds = tuple[SeedSequence, SeedSequence, SeedSequence]
+"""What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
 
 
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
@@ -52,19 +48,20 @@ def generator(seed: SeedSequence) -> Generator:
 
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
     """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
-    purposes = ("world", "sensor_noise", "action_ties")
     return [
-        EpisodeSeeds(*(stream(root, purpose, generation, episode) for purpose in purposes))
+        (
+            stream(root, "world", generation, episode),
+            stream(root, "sensor_noise", generation, episode),
+            stream(root, "action_ties", generation, episode),
+        )
         for episode in range(first, first + count)
     ]
 
 
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
     """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and variants."""
-    return [
-        EpisodeSeeds(*(stream(SHARED_ROOT, purpose, episode, kind) for kind in range(len(EpisodeSeeds._fields))))
-        for episode in range(count)
-    ]
+    kinds = [[stream(SHARED_ROOT, purpose, episode, kind) for episode in range(count)] for kind in range(3)]
+    return list(zip(*kinds, strict=True))
 
 
 def generator_in(state: Mapping[str, Any]) -> Generator:

@@ -77,11 +77,7 @@ def cluster_of(executor: Executor) -> _Cluster:
 
 
 class _Cluster:
-    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files.
-
-    Args:
-        executor: of name ``dask``.
-    """
+    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files."""
 
     def __init__(self, executor: Executor) -> None:
         executor.check_installed()
@@ -227,13 +223,11 @@ def _slices(count: int, parts: int) -> list[slice]:
 def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tally, float]:
     """Run some brains through some episodes, in a worker; returns what came out, and how many seconds it took.
 
-    Args:
-        expected: `versions` of the process that asks.
-        world: pickled task, noise, and whether this is training.
-        work: pickled `Acting`, episodes, and whether statistics of what is sensed are wanted.
+    Pickled are in `world` task, noise, and whether this is training; in `work` `Acting`, episodes, and whether
+    statistics of what is sensed are wanted.
 
     Raises:
-        ExneatError: a version differs.
+        ExneatError: a version differs from what is `expected`, that of the process that asks.
     """
     for name, wanted in expected.items():
         if (came := versions()[name]) != wanted:

@@ -24,9 +24,7 @@ Acting = tuple[Brains, NDArray[np.float64], NDArray[np.float64]]
 """Brains, and low and span, (A,) each: low + U(0, span) is added to their actions."""
 Share = tuple[int, int, int]
 """An episode, the first brain that runs through it, and the one before which to stop."""
-Tally = tuple[
-    NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]  # fmt: skip
+Tally = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 """What the loop writes for B brains in E episodes.
 
 How each ended, ``ENDED`` or ``FAILED``, and its control steps, (E, B); sums of the reward terms, (E, B, terms); means
@@ -174,18 +172,11 @@ def run_shares(
     tally: Tally,
     trace: NDArray[np.float64] | None = None,
 ) -> None:
-    """Run brains through episodes of an opened world.
+    """Run brains through episodes of a world that was opened for this task and noise.
 
-    Args:
-        task: of the world.
-        noise: that the world was opened under.
-        halt: (1,), set by another thread to stop.
-        simulation: the world.
-        shares: which brains and episodes; taken one by one.
-        acting: who acts.
-        episodes: that shares count.
-        tally: of all of them; what belongs to `shares` is overwritten.
-        trace: (steps + 1, columns) to record the path of the last one, see `Runner.trace`.
+    `shares` say which, and are taken one by one; `episodes` are those that they count. In the `tally` of all of them,
+    what belongs to `shares` is overwritten. Another thread sets `halt`, (1,), to stop. `trace`, (steps + 1, columns),
+    is to record the path of the last one, see `Trace`.
     """
     brains, action_low, action_span = acting
     # Sd of the sensor noise, the lowest and the highest noisy reading, and `Acting` on the action.

@@ -44,7 +44,7 @@ def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     if settings.algorithm.rule != "random":
         return tests
     root = settings.seed
-    return [each._replace(actions=stream(root, "random_actions", k)) for k, each in enumerate(tests)]
+    return [(world, noise, stream(root, "random_actions", k)) for k, (world, noise, _) in enumerate(tests)]
 
 
 def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:

@@ -13,8 +13,7 @@ from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.compiling import compiled
 from exneat_cli.seeding import generator
 from exneat_cli.tasks import RUNNING, AntTask, Simulation
-from exneat_cli.tasks.robots.dynamics import AntWorld, observe, step
-from exneat_cli.tasks.robots.mujoco_library import mj_rnePostConstraint, mj_step
+from exneat_cli.tasks.robots.dynamics import AntWorld, mj_rnePostConstraint, mj_step, observe, step
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import TASK, Workload, open_runner
 

@@ -69,7 +69,7 @@ class Foraging(GridTask):
     """Prey never move here; no settings, see `Hunting`."""
 
     def __post_init__(self) -> None:
-        check_choice("task.name", self.name, ["foraging" if self.channels == 1 else "hunting"])
+        check_choice("task.name", self.name, [type(self).name])
         check_whole("task.size", self.size, 3, 99)
         check_whole("task.n_prey", self.n_prey, 1, self.size**2 - 1)
         check_whole("task.steps", self.steps, 1, 1_000_000)
@@ -78,9 +78,6 @@ class Foraging(GridTask):
         check_whole("task.patch_width", self.patch_width, 1, 15)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
-        self._check_memory()
-
-    def _check_memory(self) -> None:
         per_prey = (self.size + 2) ** 2 * self.channels
         most_prey, most_steps = MOST_CUES // per_prey, MOST_CUES // (per_prey * self.n_prey)
         fix = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"

@@ -15,8 +15,8 @@ Observation (8 numbers without a unit, clipped to [0, 1]):
 Action (5 numbers, the value of each move): 0 left, 1 right, 2 up, 3 down, 4 stay. The largest wins, after
 U(0, 1e-3) is added to each so that ties break fairly. A step into a wall stays.
 
-A new world is a file with a frozen dataclass that derives from `GridTask` (`exneat_cli.tasks.grid.track_maze` is the
-shortest to start from), a line in `exneat_cli.tasks.TASKS`, and a YAML file in `conf/task`.
+A new world is a file with a frozen dataclass that derives from `GridTask` (the track of `exneat_cli.tasks.grid.mazes`
+is the shortest to start from), a line in `exneat_cli.tasks.TASKS`, and a YAML file in `conf/task`.
 
 Source: Zhang (2025), section 3.2.
 """

@@ -42,8 +42,7 @@ def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world
         for seeds in training_episodes(11, 0, 60):
             trace, _ = runner.trace(acting, seeds)
             # The same episode again: for each move five draws, which choose alone or break ties.
-            choices = generator(seeds.actions)
-            env.unwrapped.np_random = generator(seeds.world)
+            env.unwrapped.np_random, _, choices = map(generator, seeds)
             observation, _ = env.reset()
             rewards, over = [], False
             while not over:
