@@ -29,7 +29,7 @@ _ROOMS = ("exneat_cli.runs", "exneat_cli.analysis", "exneat_cli.commands.launchi
 """Importing these imports every other room and every library."""
 _PHYSICS = """
 import mujoco, numba
-from exneat_cli.tasks.robots.mujoco_library import load_library, mj_step
+from exneat_cli.tasks.robots.dynamics import load_library, mj_step
 load_library()
 model = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><geom type="plane" size="9 9 1"/>'

@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import check_choice, check_real, check_whole
-from exneat_cli.tasks.robots import dynamics, mujoco_library
+from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.parts import FORCES_PER_BODY, SKIPPED_POSITIONS, find_parts
 from exneat_cli.tasks.task import Part, Simulation, Task
 
@@ -112,8 +112,7 @@ class AntTask(Task):
     @property
     def trunk(self) -> Part:  # type: ignore[override]
         """The trunk's 17 sensors; it has no actuators of its own."""
-        trunk, _ = _trunk_and_legs()
-        return replace(trunk, name="trunk")
+        return _trunk_and_legs()[0]
 
     @property
     def observation_size(self) -> int:
@@ -151,14 +150,8 @@ class AntTask(Task):
         return self.open_disturbed(training=training, reset_scale=RESET_SCALE)
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
-        """Open a new world.
-
-        Args:
-            training: whether an episode ends once the body makes no progress.
-            reset_scale: size of the noise on the initial pose.
-        """
-        mujoco_library.load_library()
-        mujoco_library.silence_warnings()
+        """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
+        dynamics.load_library()
         model = _model()
         data = mujoco.MjData(model)
         world = dynamics.AntWorld(
@@ -171,7 +164,6 @@ class AntTask(Task):
             cfrc_ext=data.cfrc_ext,
             warnings=data.warning.number,
             initial_qpos=data.qpos.copy(),
-            initial_qvel=data.qvel.copy(),
             start_qpos=data.qpos.copy(),
             start_qvel=data.qvel.copy(),
             trunk=TRUNK_BODY,
@@ -204,7 +196,7 @@ def _model() -> mujoco.MjModel:
 def _trunk_and_legs() -> tuple[Part, list[Part]]:
     """The legs by the names of where they stand, which are not those of the model's bodies."""
     trunk, legs = find_parts(_model())
-    return trunk, [replace(leg, name=_quadrant(*leg.position)) for leg in legs]
+    return replace(trunk, name="trunk"), [replace(leg, name=_quadrant(*leg.position)) for leg in legs]
 
 
 def _quadrant(x: float, y: float) -> str:

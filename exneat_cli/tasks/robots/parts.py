@@ -26,48 +26,25 @@ def find_parts(model: mujoco.MjModel) -> tuple[Part, list[Part]]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     trunk = int(model.jnt_bodyid[np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0]])
-    parts, bodies_of_parts = [], set()
-    for root in range(model.nbody):
-        if root == trunk or model.body_parentid[root] != trunk:
-            continue
-        bodies = _subtree(model, root)
-        bodies_of_parts |= set(bodies)
-        first_joint = np.flatnonzero(np.isin(model.jnt_bodyid, bodies))[0]
+    # The first body of each body's part. Children come after their parents; what hangs on no part is the trunk's.
+    owner = np.full(model.nbody, trunk)
+    for body in range(1, model.nbody):
+        parent = model.body_parentid[body]
+        owner[body] = body if parent == trunk else owner[parent]
+    # Where each entry of the observation and of the action belongs.
+    widths = np.array([7, 4, 1, 1])[model.jnt_type]  # positions of a free, ball, slide and hinge joint
+    positions = np.repeat(model.jnt_bodyid, widths)[SKIPPED_POSITIONS:]
+    forces = np.repeat(np.arange(1, model.nbody), FORCES_PER_BODY)  # body 0 is the world
+    sensors = owner[np.concatenate([positions, model.dof_bodyid, forces])]
+    actuators = owner[model.jnt_bodyid[model.actuator_trnid[:, 0]]]
+
+    def part(root: int, position: tuple[float, float]) -> Part:
+        own_sensors, own_actuators = (tuple(np.flatnonzero(owners == root).tolist()) for owners in (sensors, actuators))
+        return Part(model.body(root).name, own_sensors, own_actuators, position)
+
+    parts = []
+    for root in np.unique(owner[owner != trunk]).tolist():
+        first_joint = np.flatnonzero(owner[model.jnt_bodyid] == root)[0]
         x, y, _ = data.xanchor[first_joint] - data.xpos[trunk]
-        parts.append(_part(model, bodies, (float(x), float(y))))
-    # Whatever hangs on no part is the trunk's; body 0 is the world.
-    return _part(model, [body for body in range(1, model.nbody) if body not in bodies_of_parts], (0.0, 0.0)), parts
-
-
-def _part(model: mujoco.MjModel, bodies: list[int], position: tuple[float, float]) -> Part:
-    return Part(model.body(bodies[0]).name, _sensors(model, bodies), _actuators(model, bodies), position)
-
-
-def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    # A model numbers children after their parents.
-    bodies = [root]
-    for body in range(root + 1, model.nbody):
-        if model.body_parentid[body] in bodies:
-            bodies.append(body)
-    return bodies
-
-
-def _sensors(model: mujoco.MjModel, bodies: list[int]) -> tuple[int, ...]:
-    first_velocity = model.nq - SKIPPED_POSITIONS
-    first_force = first_velocity + model.nv
-    sensors = []
-    for joint in np.flatnonzero(np.isin(model.jnt_bodyid, bodies)):
-        # A free joint has 7 positions (x, y, z and a quaternion) and 6 velocities, a hinge or slide one of each.
-        free = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        positions = range(SKIPPED_POSITIONS, 7) if free else range(1)
-        velocities = range(6) if free else range(1)
-        sensors += [int(model.jnt_qposadr[joint]) + k - SKIPPED_POSITIONS for k in positions]
-        sensors += [first_velocity + int(model.jnt_dofadr[joint]) + k for k in velocities]
-    for body in bodies:
-        sensors += [first_force + FORCES_PER_BODY * (body - 1) + k for k in range(FORCES_PER_BODY)]
-    return tuple(sorted(sensors))
-
-
-def _actuators(model: mujoco.MjModel, bodies: list[int]) -> tuple[int, ...]:
-    joints = model.actuator_trnid[:, 0]
-    return tuple(int(a) for a in range(model.nu) if model.jnt_bodyid[joints[a]] in bodies)
+        parts.append(part(root, (float(x), float(y))))
+    return part(trunk, (0.0, 0.0)), parts

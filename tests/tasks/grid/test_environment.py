@@ -40,10 +40,9 @@ def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world
     place = np.zeros(located)
     with Runner(task, Noise(), Executor("serial"), training=False) as runner:
         for seeds in training_episodes(11, 0, 60):
-            trace = runner.trace(acting, seeds).steps
+            trace, _ = runner.trace(acting, seeds)
             # The same episode again: for each move five draws, which choose alone or break ties.
-            choices = generator(seeds.actions)
-            env.unwrapped.np_random = generator(seeds.world)
+            env.unwrapped.np_random, _, choices = map(generator, seeds)
             observation, _ = env.reset()
             rewards, over = [], False
             while not over:

@@ -17,8 +17,8 @@ from exneat_cli.brains import linear_fusion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import shared_episodes
 from exneat_cli.tasks import ENDED, RUNNING, GeneralMaze, TrackMaze
-from exneat_cli.tasks.grid.general_maze import carve
 from exneat_cli.tasks.grid.maze import FURTHEST, GOAL_COLUMN, GOAL_ROW, Maze, locate, step
+from exneat_cli.tasks.grid.mazes import carve
 from exneat_cli.tasks.grid.world import MOVES, STAY
 
 ODD = st.integers(2, 15).map(lambda k: 2 * k + 1)

@@ -187,7 +187,7 @@ def test_stepping_onto_a_prey_catches_it_and_the_last_one_ends_the_episode() -> 
 @pytest.mark.parametrize("task", [Foraging(), Hunting()])
 def test_following_the_cues_is_far_better_than_chance(task: Foraging) -> None:
     seeds = shared_episodes("test", 100)
-    own = [each._replace(actions=stream(0, "random_actions", k)) for k, each in enumerate(seeds)]
+    own = [(world, noise, stream(0, "random_actions", k)) for k, (world, noise, _) in enumerate(seeds)]
     with Runner(task, Noise(), Executor(), training=False) as runner:
         fusion = runner.run([linear_fusion(8, 5, task.parts)], seeds)
         luck = runner.run(None, own)
