@@ -24,7 +24,6 @@ from exneat_cli.algorithms import (
     Search,
     State,
     Team,
-    Trials,
     pack_teams,
     unpack_teams,
 )
@@ -54,16 +53,17 @@ class HillClimber(Algorithm):
 
     def start(self, problem: Problem) -> Search:
         """Begin with one of the teams that ExNEAT begins with."""
-        (first, *_) = ExNEAT().start(dataclasses.replace(problem, population=2)).ask().teams
+        (first, *_), _ = ExNEAT().start(dataclasses.replace(problem, population=2)).ask()
         return Climb(problem, self.sigma, first)
 
     def restored(self, problem: Problem, state: State) -> Search:
         """Go on from a checkpoint."""
-        (parent,) = unpack_teams(state.arrays, "parent", problem)
+        plain, columns = state
+        (parent,) = unpack_teams(columns, "parent", problem)
         climb = Climb(problem, self.sigma, parent)
-        climb.rng = generator_in(state.plain["rng"])
-        climb.generation = int(state.plain["generation"])
-        climb.fitness = state.plain["fitness"]
+        climb.rng = generator_in(plain["rng"])
+        climb.generation = int(plain["generation"])
+        climb.fitness = plain["fitness"]
         return climb
 
 
@@ -82,10 +82,10 @@ class Climb(Search):
         self.generation = 0
         self.fitness: float | None = None
 
-    def ask(self) -> Trials:
+    def ask(self) -> tuple[list[Team], int]:
         """The parent, in the new episodes of this generation, and its children."""
         self.teams = [self.parent, *(self._child(k) for k in range(1, self.problem.population))]
-        return Trials(self.teams, self.problem.episodes)
+        return self.teams, self.problem.episodes
 
     def tell(self, results: Results) -> bool:
         """Go on from the best; a generation is one turn."""
@@ -103,7 +103,7 @@ class Climb(Search):
     def state(self) -> State:
         """The parent and the random numbers to come."""
         plain = {"rng": self.rng.bit_generator.state, "generation": self.generation, "fitness": self.fitness}
-        return State(plain, pack_teams([self.parent], "parent"))
+        return plain, pack_teams([self.parent], "parent")
 
     def _child(self, number: int) -> Team:
         key = (self.generation + 1) * self.problem.population + number

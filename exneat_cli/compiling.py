@@ -125,6 +125,4 @@ def with_functions(template: Callable[..., Any], name: str, **functions: Callabl
     """
     copy = types.FunctionType(template.__code__, {**template.__globals__, **functions}, name)
     copy.__qualname__ = name
-    copy.__module__ = template.__module__
-    copy.__doc__ = template.__doc__
     return copy

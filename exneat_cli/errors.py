@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -48,95 +49,54 @@ def shortened(value: object) -> str:
 
 
 def check_whole(key: str, value: object, low: int, high: int | None = None) -> None:
-    """Refuse anything but an integer in ``[low, high]`` (no upper bound if `high` is None).
-
-    Raises:
-        ConfigError: `value` is a bool, not an integer, or out of range.
-    """
-    bounds = f"a whole number of at least {low}" if high is None else f"a whole number from {low} to {high}"
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise ConfigError(key, bounds, value)
-    if value < low or (high is not None and value > high):
+    """Refuse anything but an integer in ``[low, high]`` (no upper bound if `high` is None) with a `ConfigError`."""
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if not whole or value < low or (high is not None and value > high):  # type: ignore[operator]
+        bounds = f"a whole number of at least {low}" if high is None else f"a whole number from {low} to {high}"
         raise ConfigError(key, bounds, value)
 
 
 def check_real(key: str, value: object, low: float, high: float = math.inf) -> None:
-    """Refuse anything but a finite number in ``[low, high]``.
-
-    Raises:
-        ConfigError: `value` is not a number, is NaN or infinite, or out of range.
-    """
-    bounds = f"a number of at least {low:g}" if high == math.inf else f"a number from {low:g} to {high:g}"
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise ConfigError(key, bounds, value)
-    if not is_finite(value) or value < low or value > high:
+    """Refuse anything but a finite number in ``[low, high]`` with a `ConfigError`."""
+    if not isinstance(value, int | float) or isinstance(value, bool) or not (is_finite(value) and low <= value <= high):
+        bounds = f"a number of at least {low:g}" if high == math.inf else f"a number from {low:g} to {high:g}"
         raise ConfigError(key, bounds, value)
 
 
 def is_finite(value: float) -> bool:
     """Whether a number is finite as a double: Python's whole numbers can be larger than any."""
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
+    return abs(value) <= sys.float_info.max
 
 
 def check_flag(key: str, value: object) -> None:
-    """Refuse anything but True or False.
-
-    Raises:
-        ConfigError: `value` is not a bool.
-    """
+    """Refuse anything but True or False with a `ConfigError`."""
     if not isinstance(value, bool):
         raise ConfigError(key, "true or false", value)
 
 
 def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
-    """Refuse anything but one of `choices`.
-
-    Raises:
-        ConfigError: `value` is none of them.
-    """
+    """Refuse anything but one of `choices` with a `ConfigError`."""
     if not isinstance(value, str) or value not in choices:
         raise ConfigError(key, "one of " + ", ".join(choices), value)
 
 
 def check_text(key: str, value: object, expected: str = "text") -> None:
-    """Refuse anything but printable text, at least one character of it.
-
-    Args:
-        key: the setting's dotted name.
-        value: what came.
-        expected: what the text must be, in words.
-
-    Raises:
-        ConfigError: `value` is something else.
-    """
+    """Refuse anything but printable text with a `ConfigError`, which says in words what was `expected`."""
     if not isinstance(value, str) or not value or not value.isprintable():
         raise ConfigError(key, expected, value)
 
 
 def check_section(key: str, value: object) -> Mapping[str, Any]:
-    """Return keys with values, and refuse anything else.
-
-    Raises:
-        ConfigError: `value` is something else.
-    """
+    """Return keys with values, and refuse anything else with a `ConfigError`."""
     if not isinstance(value, Mapping):
         raise ConfigError(key, "a section with keys of its own", value)
     return value
 
 
 def check_keys(prefix: str, values: Mapping[str, Any], known: Collection[str]) -> None:
-    """Refuse a key that is not among those `known`, and name the nearest that is.
+    """Refuse a key that is not `known` with an `ExneatError` that names the nearest one.
 
-    Args:
-        prefix: what stands before the keys in messages, e.g. ``task.``.
-        values: keys with values.
-        known: the keys that there are.
-
-    Raises:
-        ExneatError: there is such a key.
+    In messages `prefix`, e.g. ``task.``, stands before the keys.
     """
     for key in values:
         if key not in known:

@@ -63,12 +63,9 @@ def program() -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code.
+    """Run one command, by default the process's own; returns its exit code.
 
     0 is done, 1 a failed job or an unfit machine, 2 refused, 130 or 143 interrupted.
-
-    Args:
-        arguments: without the program's name; None takes the process's own.
     """
     command, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
@@ -85,8 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if line.shown:
                 print(line.show())
                 return 0
-            code: int = importlib.import_module(f"exneat_cli.commands.{command}").run(line)
-            return code
+            return int(importlib.import_module(f"exneat_cli.commands.{command}").run(line))
         except (Exception, KeyboardInterrupt) as error:
             return _ended_by(error)
 

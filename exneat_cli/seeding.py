@@ -8,7 +8,7 @@ episodes grow from a constant instead of the run's seed: every run and every var
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from numpy.random import PCG64, Generator, SeedSequence
 
@@ -29,24 +29,14 @@ SHARED_ROOT = 0
 """Root of the validation and test streams, which do not depend on the run's seed."""
 
 
-class EpisodeSeeds(NamedTuple):
-    """What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
-
-    world: SeedSequence
-    sensor_noise: SeedSequence
-    actions: SeedSequence
+EpisodeSeeds = tuple[SeedSequence, SeedSequence, SeedSequence]
+"""What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
 
 
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
-    """Seed of one stream.
+    """Seed of one stream of a run with seed `root`; `purpose` is a key of `STREAMS`.
 
-    Args:
-        root: the run's seed, at least 0.
-        purpose: a key of `STREAMS`.
-        indices: which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
-
-    Raises:
-        KeyError: `purpose` is not a stream.
+    `indices` say which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
     """
     return SeedSequence(root, spawn_key=(STREAMS[purpose], *indices))
 
@@ -59,10 +49,10 @@ def generator(seed: SeedSequence) -> Generator:
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
     """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
     return [
-        EpisodeSeeds(
-            world=stream(root, "world", generation, episode),
-            sensor_noise=stream(root, "sensor_noise", generation, episode),
-            actions=stream(root, "action_ties", generation, episode),
+        (
+            stream(root, "world", generation, episode),
+            stream(root, "sensor_noise", generation, episode),
+            stream(root, "action_ties", generation, episode),
         )
         for episode in range(first, first + count)
     ]
@@ -70,10 +60,8 @@ def training_episodes(root: int, generation: int, count: int, first: int = 0) ->
 
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
     """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and variants."""
-    return [
-        EpisodeSeeds(*(stream(SHARED_ROOT, purpose, episode, kind) for kind in range(len(EpisodeSeeds._fields))))
-        for episode in range(count)
-    ]
+    kinds = [[stream(SHARED_ROOT, purpose, episode, kind) for episode in range(count)] for kind in range(3)]
+    return list(zip(*kinds, strict=True))
 
 
 def generator_in(state: Mapping[str, Any]) -> Generator:
@@ -83,6 +71,5 @@ def generator_in(state: Mapping[str, Any]) -> Generator:
         KeyError, OverflowError, TypeError, ValueError: it is no such state.
     """
     bit_generator = PCG64(0)
-    given: Any = dict(state)
-    bit_generator.state = given
+    bit_generator.state = dict(state)  # type: ignore[assignment]
     return Generator(bit_generator)

@@ -28,7 +28,7 @@ def test_training_validation_and_test_episodes_are_disjoint(root: int) -> None:
 @given(SEEDS, st.integers(0, 50))
 def test_training_episodes_repeat_and_differ_between_generations(root: int, generation: int) -> None:
     def draws(g: int) -> list[tuple[float, ...]]:
-        return [first_draws(episode.world) for episode in training_episodes(root, g, 3)]
+        return [first_draws(world) for world, *_ in training_episodes(root, g, 3)]
 
     assert draws(generation) == draws(generation)
     assert not set(draws(generation)) & set(draws(generation + 1))
@@ -44,6 +44,6 @@ def test_two_roots_have_different_streams(one: int, other: int) -> None:
 
 
 def test_more_test_episodes_leave_the_first_ones_as_they_are() -> None:
-    few = [first_draws(episode.world) for episode in shared_episodes("test", 3)]
-    many = [first_draws(episode.world) for episode in shared_episodes("test", 30)]
+    few = [first_draws(world) for world, *_ in shared_episodes("test", 3)]
+    many = [first_draws(world) for world, *_ in shared_episodes("test", 30)]
     assert many[:3] == few

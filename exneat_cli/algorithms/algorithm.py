@@ -34,13 +34,6 @@ class Candidate(NamedTuple):
     generation: int
 
 
-class Trials(NamedTuple):
-    """What an algorithm asks for: teams, and how many episodes each of them gets, the same ones for all."""
-
-    teams: Sequence[Team]
-    episodes: int
-
-
 class Results(NamedTuple):
     """What an algorithm is told of T teams in E episodes.
 
@@ -77,19 +70,16 @@ class Problem:
     seed: int
 
 
-class State(NamedTuple):
-    """A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
-
-    plain: dict[str, Any]
-    arrays: dict[str, NDArray[Any]]
+State = tuple[dict[str, Any], dict[str, NDArray[Any]]]
+"""A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
 
 
 class Search(ABC):
     """An algorithm at work. A generation is one or more turns of `ask` and `tell`."""
 
     @abstractmethod
-    def ask(self) -> Trials:
-        """The teams to evaluate next.
+    def ask(self) -> tuple[Sequence[Team], int]:
+        """The teams to evaluate next, and how many episodes each of them gets, the same ones for all.
 
         Raises:
             RuntimeError: the last ones were not told.

@@ -5,22 +5,23 @@ Imperial College London, 2025, section 3.1.2; Stanley and Miikkulainen, "Evolvin
 topologies", Evolutionary Computation 10(2), 2002. NEAT is the case of one module with one subpopulation.
 
 A generation: `ask` reproduces every subpopulation by the last fitness and pairs their genomes into teams; `tell`
-gives every genome of a team the team's mean over its episodes.
+gives every genome of a team the team's mean over its episodes. The champion is chosen from the hall of fame.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team, Trials
+from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.neat.conversion import Columns, pack_teams, unpack_teams
 from exneat_cli.algorithms.neat.neat_python import neat_config
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.algorithms.teams import pack_teams, unpack_teams, with_candidate
 from exneat_cli.errors import check_choice
 from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
@@ -29,14 +30,13 @@ from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
 PAIRINGS = ("rank", "index")
 """``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together;
 ``index`` pairs in neat-python's own order."""
+MARGIN = 0.1
+"""A team is in the hall of fame while its fitness is at least best - MARGIN * |best|."""
+CAPACITY = 20
 
 
 class Coevolution(Search):
-    """One NEAT subpopulation for each that the plan names, paired into teams.
-
-    Args:
-        problem: see there.
-        state: of the co-evolution that this one goes on from; None to begin with random genomes.
+    """One NEAT subpopulation for each that the plan names, paired into teams; begins at random or goes on from a state.
 
     Raises:
         ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the state is none, or does not fit.
@@ -55,25 +55,30 @@ class Coevolution(Search):
             seeds = [stream(problem.seed, "evolution", index) for index in range(len(shapes))]
             self._subpopulations = [Subpopulation(*own) for own in zip(configs, seeds, strict=True)]
         else:
+            plain, arrays = state
             self._subpopulations = [
-                Subpopulation.restored(config, State(own, state.arrays), f"current.{index}")
-                for index, (config, own) in enumerate(zip(configs, state.plain["subpopulations"], strict=True))
+                Subpopulation.restored(config, (own, arrays), f"current.{index}")
+                for index, (config, own) in enumerate(zip(configs, plain["subpopulations"], strict=True))
             ]
-            self._restore(state)
+            self._restore(plain, arrays)
 
-    def ask(self) -> Trials:
+    def ask(self) -> tuple[list[Team], int]:
         """The teams of the next generation; the first call gives the first one."""
         if self._teams and not self._fitness:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
         ranked = [self._teams[k].ids for k in best_first(self._fitness)]
+        self._extinctions = 0
         if self._fitness:
-            self._reproduce()
+            shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
+            for index, subpopulation in enumerate(self._subpopulations):
+                fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
+                self._extinctions += subpopulation.advance(fitness)
         orders = [
             self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
             for index, subpopulation in enumerate(self._subpopulations)
         ]
         self._teams, self._fitness = [self._team(ids) for ids in zip(*orders, strict=True)], []
-        return Trials(list(self._teams), self._problem.episodes)
+        return list(self._teams), self._problem.episodes
 
     def tell(self, results: Results) -> bool:
         """Give every team its mean fitness; the generation is over then."""
@@ -93,21 +98,8 @@ class Coevolution(Search):
         self._generation += 1
         return True
 
-    def _reproduce(self) -> None:
-        """Replace the genomes of every subpopulation by the fitness of their teams."""
-        shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
-        self._extinctions = 0
-        for index, subpopulation in enumerate(self._subpopulations):
-            fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
-            self._extinctions += subpopulation.advance(fitness)
-
     def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
-        """One subpopulation's genomes in the order of the teams that they join: survivors, then offspring shuffled.
-
-        Args:
-            ids: of the genomes there are now.
-            ranked: of those of the last generation, those of the best team first.
-        """
+        """One subpopulation's `ids` as teams take them: survivors in the order of `ranked`, then offspring shuffled."""
         if self._problem.pairing == "index":
             return ids
         there, before = set(ids), set(ranked)
@@ -137,7 +129,7 @@ class Coevolution(Search):
             raise RuntimeError("state: expected ask() and tell(results) before it")
         states = [each.state(f"current.{index}") for index, each in enumerate(self._subpopulations)]
         plain = {
-            "subpopulations": [own.plain for own in states],
+            "subpopulations": [own for own, _ in states],
             "pairing": dict(self._pairing_rng.bit_generator.state),
             "teams": [list(team.ids) for team in self._teams],
             "fitness": self._fitness,
@@ -145,13 +137,12 @@ class Coevolution(Search):
             "hall_of_fame": [[entry.fitness, entry.generation] for entry in self._hall_of_fame],
         }
         arrays = pack_teams([entry.team for entry in self._hall_of_fame], "hall_of_fame")
-        for own in states:
-            arrays |= own.arrays
-        return State(plain, arrays)
+        for _, columns in states:
+            arrays |= columns
+        return plain, arrays
 
-    def _restore(self, state: State) -> None:
+    def _restore(self, plain: Mapping[str, Any], arrays: Columns) -> None:
         """Bring all but the subpopulations into the state that `state` gave."""
-        plain = state.plain
         self._pairing_rng = generator_in(plain["pairing"])
         self._teams = [self._team(tuple(int(key) for key in ids)) for ids in plain["teams"]]
         for index, subpopulation in enumerate(self._subpopulations):
@@ -161,7 +152,7 @@ class Coevolution(Search):
         if len(self._fitness) != len(self._teams) or not all(map(math.isfinite, self._fitness)):
             raise ValueError("expected a finite fitness of every team")
         self._generation = int(plain["generation"])
-        teams = unpack_teams(state.arrays, "hall_of_fame", self._problem)
+        teams = unpack_teams(arrays, "hall_of_fame", self._problem)
         for team, (fitness, generation) in zip(teams, plain["hall_of_fame"], strict=True):
             if not math.isfinite(fitness) or not 0 <= generation < self._generation:
                 raise ValueError(f"expected a finite fitness in a generation before now, got {fitness}, {generation}")
@@ -199,13 +190,23 @@ class NEAT(ExNEAT):
         return plan_body(task, hidden=evolution.neat_hidden)
 
 
-def failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
-    """The same values, but for failed teams, which rank behind all sound ones, also behind those below the floor.
+def with_candidate(hall_of_fame: Sequence[Candidate], offered: Candidate) -> list[Candidate]:
+    """The hall of fame after a team that did not fail was offered to it, which enters if it is good enough.
 
-    Args:
-        fitness: of every team.
-        sound: indices of those that did not fail.
+    There are at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes, with the
+    best fitness that each ever had; the best first, of equals the earlier one first.
     """
+    entries = {entry.team.ids: entry for entry in hall_of_fame}
+    known = entries.get(offered.team.ids)
+    if known is None or offered.fitness > known.fitness:
+        entries[offered.team.ids] = offered
+    ranked = sorted(entries.values(), key=lambda entry: (-entry.fitness, entry.generation))
+    threshold = ranked[0].fitness - MARGIN * abs(ranked[0].fitness)
+    return [entry for entry in ranked if entry.fitness >= threshold][:CAPACITY]
+
+
+def failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
+    """The same values, but for teams not in `sound`, which rank behind those, also behind those below the floor."""
     if not sound:
         return list(fitness)
     behind = math.nextafter(min(fitness[k] for k in sound), -math.inf)

@@ -7,36 +7,57 @@ modules read them, then whatever else is evaluated, then one that stays 0 and st
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ArrayGenome
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE, end_to_end, mark_sources, node_row, row_of
 from exneat_cli.brains.brain import Brains
-from exneat_cli.brains.wiring_arrays import wiring_arrays
 from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
+NETWORK = np.dtype([("inputs", np.int64), ("read_outside", np.int64)])
+"""Of a subpopulation: how many pins a module has, and how many of its first nodes are read from outside: the outputs
+and, where they are linked, the initial hidden nodes."""
+PIN = np.dtype([("index", np.int64), ("module", np.int64), ("delayed", np.bool_)], align=True)
+"""As in `exneat_cli.wiring.Pin`."""
+ACTUATOR = np.dtype([("module", np.int64), ("output", np.int64)])
+"""The module that sets it, -1 for none, and which of its outputs does."""
 
-def assemble(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> Brains:
-    """Compile one genome per subpopulation into the brain that `plan` wires.
+
+@functools.lru_cache(maxsize=16)
+def wiring_tables(plan: Plan) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """A plan for compiled code: (S,) networks, (M,) the subpopulation of each module, (P,) all pins, (A,) actuators."""
+    networks = np.zeros(len(plan.subpopulation_shapes), NETWORK)
+    actuators = np.array([(-1, 0)] * plan.action_size, ACTUATOR)
+    for m, module in enumerate(plan.modules):
+        read_outside = module.outputs + (module.hidden if plan.hidden_is_linked(m) else 0)
+        networks[module.subpopulation] = len(module.pins), read_outside
+        for output, actuator in enumerate(module.drives):
+            actuators[actuator] = m, output
+    subpopulation = np.array([module.subpopulation for module in plan.modules], np.int64)
+    pins = [(pin.index, pin.module, pin.delayed) for module in plan.modules for pin in module.pins]
+    return networks, subpopulation, np.array(pins, PIN), actuators
+
+
+def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
+    """Compile each team into the brain that `plan` wires.
 
     Args:
         plan: who senses and drives what; must have at least one module.
-        genomes: indexed by subpopulation; sharing modules each get a copy of the network.
+        teams: at least one, of a genome per subpopulation; sharing modules each get a copy of its network.
         feed_forward: whether the modules are feed-forward networks, else recurrent ones.
 
     Raises:
         ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
     """
-    return assemble_all(plan, [genomes], feed_forward=feed_forward)
-
-
-def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
-    """The brains of several teams, at least one; see `assemble`."""
-    wiring = wiring_arrays(plan)
-    members = len(wiring.shapes)
+    wiring = wiring_tables(plan)
+    networks, subpopulation, pins, _ = wiring
+    members = len(networks)
     if any(len(team) != members for team in teams):
         raise ValueError(f"assemble: expected {members} genomes per team, got {sorted({len(team) for team in teams})}")
     genomes = [genome for team in teams for genome in team]
@@ -46,10 +67,9 @@ def assemble_all(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_for
     first_connection = np.cumsum([0] + [len(genome.connections) for genome in genomes])
     # Room for every gene of every module; what is left over is cut off at the end.
     room_for_nodes, room_for_edges = (
-        int(np.diff(first).reshape(-1, members)[:, wiring.subpopulation].sum())
-        for first in (first_node, first_connection)
+        int(np.diff(first).reshape(-1, members)[:, subpopulation].sum()) for first in (first_node, first_connection)
     )
-    brains = _room(plan, len(teams), room_for_nodes, room_for_edges, len(teams) * len(wiring.pin_index))
+    brains = _room(plan, len(teams), room_for_nodes, room_for_edges, len(teams) * len(pins))
     brains.recurrent[:] = not feed_forward
     _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains)
     return brains.part(0, len(teams))
@@ -75,69 +95,58 @@ def _room(plan: Plan, teams: int, nodes: int, edges: int, links: int) -> Brains:
 def _assemble(wiring, nodes, first_node, connections, first_connection, feed_forward, brains):  # type: ignore[no-untyped-def]
     """Fill in the brains of T teams of S genomes each.
 
-    Args:
-        wiring: the plan, of M modules and P pins.
-        nodes: (N,) genes of all genomes, team by team, each in the order of the subpopulations.
-        first_node: (T * S + 1,) the nodes of genome g are first_node[g] to first_node[g + 1].
-        connections: (C,) likewise.
-        first_connection: (T * S + 1,) likewise.
-        feed_forward: the kind of networks.
-        brains: with room for all.
+    Genomes come team by team, each in the order of the subpopulations: genome g has the `nodes` from first_node[g] to
+    first_node[g + 1], and `connections` likewise.
     """
-    members, modules = wiring.shapes.shape[0], wiring.subpopulation.size
+    networks, subpopulation, pins, _ = wiring
+    members, modules = networks.size, subpopulation.size
     # Of the networks, gene by gene: rows in the order of evaluation, local indices of nodes and of what is read.
     order, slot_of = np.zeros(nodes.size, np.int64), np.zeros(nodes.size, np.int64)
     source_of = np.zeros(connections.size, np.int64)
     evaluated, slots = np.zeros(members, np.int64), np.zeros(members, np.int64)
     # Of one team: the first slot of each module, and the slot that each pin reads.
-    base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(wiring.pin_index.size, np.int64)
+    base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(pins.size, np.int64)
     for t in range(brains.size.size):
         # 1. One network per genome.
         for s in range(members):
-            a, b = first_node[t * members + s], first_node[t * members + s + 1]
-            c, d = first_connection[t * members + s], first_connection[t * members + s + 1]
+            g = t * members + s
+            a, b, c, d = first_node[g], first_node[g + 1], first_connection[g], first_connection[g + 1]
             evaluated[s], slots[s] = _express(
-                wiring, s, nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
+                networks[s], nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
             )
         # 2. One stretch of slots per module.
         _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains)
         # 3. Nodes and edges; modules that share a genome each get a copy.
         brains.first_node[t + 1] = brains.first_node[t]
+        first_pin = 0
         for m in range(modules):
-            s = wiring.subpopulation[m]
-            a, c, d = (
-                first_node[t * members + s],
-                first_connection[t * members + s],
-                first_connection[t * members + s + 1],
-            )
-            rows, pins = order[a : a + evaluated[s]], pin_slot[wiring.first_pin[m] : wiring.first_pin[m + 1]]
-            _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], pins, base[m], brains)
+            s = subpopulation[m]
+            g = t * members + s
+            a, c, d = first_node[g], first_connection[g], first_connection[g + 1]
+            rows, read = order[a : a + evaluated[s]], pin_slot[first_pin : first_pin + networks[s].inputs]
+            _write_module(t, nodes[a:], connections[c:d], rows, slot_of[a:], source_of[c:d], read, base[m], brains)
+            first_pin += networks[s].inputs
 
 
 @compiled
 def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type: ignore[no-untyped-def]
     """Decide where the values of team `t` are kept, and write its links and actuators.
 
-    Args:
-        wiring: the plan.
-        t: which team.
-        slots: (S,) how many each network has.
-        feed_forward: the kind of networks.
-        base: (M + 1,) overwritten: the first slot of each module; they lie behind what is sensed.
-        pin_slot: (P,) overwritten: the slot that each pin reads.
-        brains: of all teams.
+    Network s has `slots[s]` of them. Overwritten are `base`, (M + 1,), by the first slot of each module, which lie
+    behind what is sensed, and `pin_slot`, (P,), by the slot that each pin reads.
     """
-    base[0] = wiring.observation_size
-    for m in range(wiring.subpopulation.size):
-        base[m + 1] = base[m] + slots[wiring.subpopulation[m]]
+    _, subpopulation, pins, actuators = wiring
+    base[0] = brains.observation_size
+    for m in range(subpopulation.size):
+        base[m + 1] = base[m] + slots[subpopulation[m]]
     # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
     # slot still holds the previous step's value anyway. Copies lie behind the modules.
     link, end = brains.first_link[t], base[-1]
     for p in range(pin_slot.size):
-        pin_slot[p] = wiring.pin_index[p]
-        if wiring.pin_module[p] >= 0:
-            pin_slot[p] += base[wiring.pin_module[p]]
-        if feed_forward and wiring.pin_delayed[p]:
+        pin_slot[p] = pins[p].index
+        if pins[p].module >= 0:
+            pin_slot[p] += base[pins[p].module]
+        if feed_forward and pins[p].delayed:
             brains.link_slot[link], brains.link_source[link] = end, pin_slot[p]
             pin_slot[p] = end
             link += 1
@@ -145,9 +154,9 @@ def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type
     brains.first_link[t + 1] = link
     # The last slot stays 0, for actuators that nobody drives.
     brains.size[t] = end + 1
-    for k in range(wiring.driver.size):
-        module = wiring.driver[k]
-        brains.output_slot[t, k] = end if module < 0 else base[module] + wiring.driver_output[k]
+    for k in range(actuators.size):
+        module = actuators[k].module
+        brains.output_slot[t, k] = end if module < 0 else base[module] + actuators[k].output
 
 
 @compiled
@@ -179,21 +188,13 @@ def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, b
 
 
 @compiled
-def _express(wiring, s, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
+def _express(network, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
     """Make the network of one genome; returns how many nodes it evaluates and how many value slots it has.
 
-    Args:
-        wiring: the plan.
-        s: the genome's subpopulation.
-        nodes: (N,) its genes.
-        connections: (C,) its genes.
-        feed_forward: evaluate nodes in the order of their dependencies, else all at once.
-        order: (N,) overwritten: the rows of the nodes to evaluate, in order.
-        slot_of: (N,) overwritten: local index of each node's value.
-        source_of: (C,) overwritten: local index of what each connection reads.
+    Overwritten are `order` by the rows of the nodes to evaluate, in order, and by local indices `slot_of`, of each
+    node's value, and `source_of`, of what each connection reads.
     """
-    inputs, hidden, outputs = wiring.shapes[s, 0], wiring.shapes[s, 1], wiring.shapes[s, 2]
-    read_outside = outputs + (hidden if wiring.hidden_is_linked[s] else 0)
+    inputs, read_outside = network.inputs, network.read_outside
     # First the row of the node that each connection reads, or -1 - k for pin k.
     for i in range(connections.size):
         source = connections[i].source

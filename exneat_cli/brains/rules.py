@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,10 @@ from exneat_cli.brains.brain import Brains
 from exneat_cli.tasks import Part, Task
 
 
-class RandomActions(NamedTuple):
-    """Acts at random, whatever it senses: uniform between `low` and `high`, (A,) each."""
-
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-
-
-def acting_by_rule(rule: str, task: Task) -> Brains | RandomActions:
-    """Who acts in a task by the rule ``random``, ``motionless`` or ``linear_fusion``."""
+def acting_by_rule(rule: str, task: Task) -> Brains | None:
+    """Who acts in a task by the rule ``motionless`` or ``linear_fusion``; None for ``random``, as a runner takes it."""
     if rule == "random":
-        return RandomActions(*task.action_bounds)
+        return None
     if rule == "motionless":
         return motionless(task.sensed_size, task.resting_action)
     return linear_fusion(task.sensed_size, len(task.actuator_names), task.parts)
@@ -35,10 +27,7 @@ def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Br
 
 
 def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]) -> Brains:
-    """Moves to where the sum of all channels is largest.
-
-    Each part's actuators get the sum of its sensors, all others 0.
-    """
+    """Moves to where the sum of all channels is largest: a part's actuators get that of its sensors, all others 0."""
     weights = np.zeros((action_size, observation_size))
     for part in parts:
         weights[np.ix_(part.actuators, part.sensors)] = 1.0

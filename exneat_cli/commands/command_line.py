@@ -22,52 +22,36 @@ import hydra
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, Quote, QuotedString
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
 import exneat_cli
-from exneat_cli.commands.hydra_messages import in_words
 from exneat_cli.errors import ConfigError, ExneatError
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
-_OF_LISTS = ("sweep",)
-"""Groups of which several options may be chosen at once."""
 _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
 _LONGEST = 300
 
 
 @dataclass(frozen=True)
 class CommandLine:
-    """What was typed after ``exneat``.
+    """What was typed after ``exneat``."""
 
-    Attributes:
-        words: all of it, and ``exneat`` before, for manifests.
-        primary: the YAML file that the composition starts from, if from any.
-        directories: where YAML files are looked for, in this order.
-        settings: key=value, as Hydra's composition takes them.
-        launcher: the same for Hydra's launcher.
-        multirun: whether settings with several values are to be gone through.
-        shown: ``help`` or ``job`` if that is all that is asked for, else empty.
-    """
-
-    words: tuple[str, ...]
-    primary: str | None
-    directories: tuple[Path, ...]
-    settings: tuple[str, ...]
-    launcher: tuple[str, ...]
-    multirun: bool
-    shown: str
+    words: tuple[str, ...]  # all of it, and exneat before, for manifests
+    primary: str | None  # the YAML file that the composition starts from, if from any
+    directories: tuple[Path, ...]  # where YAML files are looked for, in this order
+    settings: tuple[str, ...]  # key=value, as Hydra's composition takes them
+    launcher: tuple[str, ...]  # the same for Hydra's launcher
+    multirun: bool  # whether settings with several values are to be gone through
+    shown: str  # help or job if that is all that is asked for, else empty
 
     def compose(self, *keys: str) -> dict[str, Any]:
-        """Compose the settings with the YAML files, as dicts, lists, numbers and strings.
-
-        Args:
-            keys: those that are wanted; without any, all are.
+        """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
 
         Raises:
-            ExneatError: they do not fit together, or a value refers to something that is not there.
+            ExneatError: they do not fit together, or a key or what a value refers to is not there.
         """
         with self.composed() as config:
             try:
@@ -75,6 +59,9 @@ class CommandLine:
                 plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
             except OmegaConfBaseException as error:
                 raise ExneatError(in_words(error, self.directories)) from error
+        for key in keys:
+            if key not in plain:
+                raise ExneatError(f"{key}: is missing")
         return {str(key): value for key, value in plain.items()}
 
     @contextlib.contextmanager
@@ -85,8 +72,7 @@ class CommandLine:
             ExneatError: they do not fit together.
         """
         first, *others = map(str, self.directories)
-        places = ",".join(quoted(f"file://{directory}") for directory in others)
-        overrides = [*self.settings, f"hydra.searchpath=[{places}]"]
+        overrides = [*self.settings, f"hydra.searchpath={as_written([f'file://{directory}' for directory in others])}"]
         with contextlib.ExitStack() as ending:
             try:
                 ending.enter_context(hydra.initialize_config_dir(first, job_name="exneat", version_base="1.3"))
@@ -130,16 +116,11 @@ def shipped_directory(name: str) -> Path:
     return packaged if packaged.is_dir() else package.parent / name
 
 
-def quoted(text: str) -> str:
-    """The text in quotes, so that Hydra's grammar takes it as it stands."""
-    return QuotedString(text=text, quote=Quote.single).with_quotes()
-
-
 def as_written(value: object) -> str:
-    """A value as Hydra's grammar writes it."""
+    """A value as Hydra's grammar writes it; text stands in quotes, so that it is taken as it is."""
     if isinstance(value, list):
         return f"[{','.join(map(as_written, value))}]"
-    return quoted(value) if isinstance(value, str) else json.dumps(value)
+    return QuotedString(value, Quote.single).with_quotes() if isinstance(value, str) else json.dumps(value)
 
 
 def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
@@ -156,7 +137,13 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
         raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
-    directories = _search_path(flags.config_path, flags.config_dir)
+    shipped = shipped_directory("conf")
+    for own in flags.config_dir:
+        for path in own.rglob("*.yaml"):
+            name = path.relative_to(own)
+            if (shipped / name).exists():
+                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+    directories = (*filter(None, [flags.config_path]), shipped, *flags.config_dir)
     read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
     return CommandLine(
         words=("exneat", command, *arguments),
@@ -194,17 +181,6 @@ def _directory(text: str) -> Path:
     return directory
 
 
-def _search_path(start: Path | None, own: Sequence[Path]) -> tuple[Path, ...]:
-    """Where YAML files are looked for, in this order: where the composition starts, exneat's own, and a user's own."""
-    shipped = shipped_directory("conf")
-    for directory in own:
-        for path in directory.rglob("*.yaml"):
-            name = path.relative_to(directory)
-            if (shipped / name).exists():
-                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
-    return (*([] if start is None else [start]), shipped, *own)
-
-
 def _is_hydras(text: str) -> bool:
     return text.lstrip("+").startswith(("hydra.", "hydra/"))
 
@@ -236,7 +212,7 @@ def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = Fal
         return f"++{readable.lstrip('+')}"
     if not override.is_sweep_override():
         value = override.value()
-        if isinstance(value, list) and key not in _OF_LISTS:
+        if isinstance(value, list) and key != "sweep":  # of which several may be chosen at once
             raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
         if not isinstance(value, str | list):
             raise ConfigError(key, "the name of an option", value)
@@ -247,7 +223,34 @@ def _parsed(text: str) -> tuple[str, Override]:
     """A setting that Hydra's grammar reads, and what it reads."""
     parser = OverridesParser.create()
     key, separator, value = text.partition("=")
-    for readable in (text, f"{key}={quoted(os.path.expanduser(value))}") if separator else (text,):
+    for readable in (text, f"{key}={as_written(os.path.expanduser(value))}") if separator else (text,):
         with contextlib.suppress(HydraException):
             return readable, parser.parse_override(readable)
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")
+
+
+def in_words(error: BaseException, directories: Sequence[Path]) -> str:
+    """What Hydra, OmegaConf or YAML say, in one or two lines that name the file, the setting, or the known options."""
+    error = error if str(error) else error.__cause__ or error
+    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        group, _, option = str(error.missing_cfg_file).rpartition("/")
+        files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
+        known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
+        return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: cannot be read as YAML: {error.problem}"
+    if isinstance(error, UnicodeDecodeError):
+        paths = (path for directory in directories for path in directory.rglob("*.yaml"))
+        place = next((path for path in paths if error.object in path.read_bytes()), "a YAML file")
+        return f"{place}: expected UTF-8 text, got the byte {error.object[error.start]:#04x}"
+    if isinstance(error, RecursionError):
+        return "a YAML file leads back to itself through its defaults, or values do through ${...}"
+    cause = error.__cause__
+    if isinstance(cause, ConfigKeyError | ConfigAttributeError) and cause.parent_node is not None:
+        return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
+    first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
+    if key := getattr(error, "full_key", None):
+        first = f"{key}: {first}"
+    if isinstance(error, InterpolationKeyError):
+        first += "\n  a YAML file of your own that sets it begins with # @package _global_"
+    return first

@@ -15,17 +15,12 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
-
-if TYPE_CHECKING:
-    from exneat_cli.records import RunDirectory
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -34,7 +29,7 @@ _ROOMS = ("exneat_cli.runs", "exneat_cli.analysis", "exneat_cli.commands.launchi
 """Importing these imports every other room and every library."""
 _PHYSICS = """
 import mujoco, numba
-from exneat_cli.tasks.robots.mujoco_library import load_library, mj_step
+from exneat_cli.tasks.robots.dynamics import load_library, mj_step
 load_library()
 model = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><geom type="plane" size="9 9 1"/>'
@@ -75,7 +70,7 @@ def run(line: CommandLine) -> int:
     plain = line.compose()
     check_keys("", plain, ("output",))
     check_text("output", plain["output"], "a directory")
-    states: Counter[str] = Counter()
+    states = []
     for name, look, worst, remedy in _checks(Path(plain["output"])):
         try:
             state, found = OK, look()
@@ -84,12 +79,13 @@ def run(line: CommandLine) -> int:
         print(f"{state:<9} {name:<16} {found}".replace("\n", "\n" + " " * 27), flush=True)
         if state != OK:
             print(f"{'':<10}remedy: {remedy}")
-        states[state] += 1
+        states.append(state)
         if name == "loading" and state != OK:
             break  # the other checks are exneat's own code at work, and would only say the same again
-    conclusion = "is not fit for exneat until what is broken is fixed" if states[BROKEN] else "is fit for exneat"
-    print(f"\n{states[OK]} ok, {states[DEGRADED]} degraded, {states[BROKEN]} broken: this machine {conclusion}.")
-    return 1 if states[BROKEN] else 0
+    conclusion = "is not fit for exneat until what is broken is fixed" if BROKEN in states else "is fit for exneat"
+    counts = ", ".join(f"{states.count(state)} {state}" for state in (OK, DEGRADED, BROKEN))
+    print(f"\n{counts}: this machine {conclusion}.")
+    return 1 if BROKEN in states else 0
 
 
 def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
@@ -180,19 +176,21 @@ def _cache() -> str:
 
 
 def _output(output: Path) -> str:
-    with _trial(output) as run, run.held(), contextlib.suppress(ExneatError), run.held():
+    from exneat_cli.records import RunDirectory
+
+    with _trial(output) as path, RunDirectory(path).held(), contextlib.suppress(ExneatError), RunDirectory(path).held():
         raise OSError(f"output={output}: the file system grants a lock twice")
     return f"output={output} can be {'written' if output.is_dir() else 'made'}, and keeps a second process out"
 
 
 @contextlib.contextmanager
-def _trial(place: Path) -> Iterator[RunDirectory]:
+def _trial(place: Path) -> Iterator[Path]:
     """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
-    from exneat_cli.records import RunDirectory, write_whole
+    from exneat_cli.records import write_whole
 
     with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=_nearest(place)) as name:
         write_whole(Path(name) / "trial", b"written by exneat doctor\n")
-        yield RunDirectory(Path(name))
+        yield Path(name)
 
 
 def _nearest(place: Path) -> Path:

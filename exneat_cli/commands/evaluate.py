@@ -6,7 +6,7 @@ import glob
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import read_sweeps, run_sweeps
+from exneat_cli.commands.jobs import with_sweeps
 from exneat_cli.errors import ConfigError, ExneatError, check_keys
 from exneat_cli.records import RunDirectory, build
 from exneat_cli.rollouts import Executor
@@ -27,15 +27,13 @@ def run(line: CommandLine) -> int:
     planned = []
     for directory in _directories(plain["run"]):
         try:
-            settings = load_settings(directory)
-            planned.append((directory, settings, read_sweeps(plain, settings)))
+            planned.append((directory, with_sweeps("", load_settings(directory), plain)))
         except ConfigError as error:
             raise ExneatError(f"{directory.path}: {error}") from error
-    for directory, settings, sweeps in planned:
-        tested = run_sweeps(directory, settings, sweeps, executor, progress_for_terminal())
-        print(
-            f"{directory.robustness}: {tested} levels tested now" if tested else f"{directory.path}: all there already"
-        )
+    for directory, job in planned:
+        tested = job.test(directory, executor, progress_for_terminal())
+        came = f"{directory.robustness}: {tested} levels tested now"
+        print(came if tested else f"{directory.path}: all there already")
     return 0
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
@@ -42,24 +44,21 @@ def _show(run: RunDirectory) -> None:
     subpopulations = len(champion.plan.subpopulation_shapes)
     print(f"{champion.variant}: {len(champion.plan.modules)} modules, {subpopulations} subpopulations, {kind}\n")
     for module in champion.plan.modules:
-        _show_module(champion, module)
+        x, y = module.position
+        print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
+        print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
+        for link in _links(champion, module):
+            print(f"  reads    {link}")
+        drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
+        print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
+        genome = champion.genomes[module.subpopulation]
+        sizes = (
+            f"{len(module.pins)} inputs, {len(genome.nodes) - module.outputs} hidden nodes, {module.outputs} outputs"
+        )
+        enabled = sum(connection.enabled for connection in genome.connections)
+        print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
     test = champion.scores.test
     print(f"test: fitness {test.fitness_mean:.4g} (sd {test.fitness_std:.3g}), {test.episodes} episodes")
-
-
-def _show_module(champion: Champion, module: Module) -> None:
-    genome = champion.genomes[module.subpopulation]
-    hidden = len(genome.nodes) - module.outputs
-    enabled = sum(connection.enabled for connection in genome.connections)
-    x, y = module.position
-    print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
-    print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
-    for line in _links(champion, module):
-        print(f"  reads    {line}")
-    drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
-    print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
-    sizes = f"{len(module.pins)} inputs, {hidden} hidden nodes, {module.outputs} outputs"
-    print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
 
 
 def _links(champion: Champion, module: Module) -> Iterable[str]:
@@ -75,7 +74,7 @@ def _links(champion: Champion, module: Module) -> Iterable[str]:
 
 
 def _list(output: Path) -> None:
-    runs = list(find_runs(output))
+    runs = find_runs(output)
     if not runs:
         print(f"No runs below {output}; exneat train makes one.")
         return
@@ -98,10 +97,5 @@ def _status(run: RunDirectory, manifest: Manifest) -> str:
 
 def _ranges(indices: Sequence[int]) -> str:
     """Whole numbers in words, e.g. ``5-6, 19-20``; order is kept where it is not ascending."""
-    parts: list[list[int]] = []
-    for index in indices:
-        if parts and index == parts[-1][-1] + 1:
-            parts[-1].append(index)
-        else:
-            parts.append([index])
+    parts = np.split(np.array(indices, int), np.flatnonzero(np.diff(indices) != 1) + 1) if indices else []
     return ", ".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)

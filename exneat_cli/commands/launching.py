@@ -19,8 +19,7 @@ from hydra.core.plugins import Plugins
 from hydra.types import HydraContext
 from omegaconf import OmegaConf
 
-from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.hydra_messages import in_words
+from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import as_worker, launching, signal_heard

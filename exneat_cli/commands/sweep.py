@@ -1,20 +1,194 @@
-"""`exneat sweep`: all runs of an experiment, one after the other or by a launcher of Hydra's."""
+"""`exneat sweep`: experiments, which are variants x conditions x seeds, from a YAML file to all of their runs."""
 
 from __future__ import annotations
 
 import functools
+import re
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
 
-from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.experiments import plan_jobs, read_experiment
-from exneat_cli.commands.jobs import Job
+import yaml
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
+from exneat_cli.commands.jobs import BUDGETS, Job, read_job
 from exneat_cli.commands.launching import run_jobs
-from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.errors import (
+    ConfigError,
+    ExneatError,
+    check_choice,
+    check_flag,
+    check_keys,
+    check_section,
+    check_text,
+    check_whole,
+)
 from exneat_cli.interruption import signal_heard
-from exneat_cli.records import DONE
+from exneat_cli.records import DONE, build
 from exneat_cli.runs import Progress, progress_for_terminal
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
+_SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "hydra"}
+"""What exneat sweep sets itself, so that no variant or condition may."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One of the things compared; without `runs` it has as many seeds as the experiment says."""
+
+    label: str
+    settings: Mapping[str, Any]
+    runs: int | None = None
+    swept: bool = True
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One training condition, and the robustness sweeps that the runs of all variants but unswept ones go through."""
+
+    label: str
+    settings: Mapping[str, Any]
+    sweeps: list[str] | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What experiments/<name>.yaml says; its first variant is the one that the others are compared with.
+
+    Settings are by dotted name, as on the command line; `runs` are the numbers of seeds 0, 1, 2, ... by budget.
+    """
+
+    name: str
+    claim: str
+    settings: Mapping[str, Any]
+    variants: Mapping[str, Variant]
+    conditions: Mapping[str, Condition]
+    runs: Mapping[str, int]
+
+
+def experiment_names() -> list[str]:
+    """Names of the experiments that come with exneat."""
+    return sorted(path.stem for path in shipped_directory("experiments").glob("*.yaml") if path.stem != "catalogue")
+
+
+def read_experiment(name: object) -> Experiment:
+    """Read one of `experiment_names`, or a YAML file of the user's own.
+
+    Raises:
+        ExneatError: there is no such experiment, or its file is damaged or makes no sense.
+    """
+    own = isinstance(name, str) and name.endswith((".yaml", ".yml"))
+    if not own and name not in experiment_names():
+        raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
+    path = Path(str(name)) if own else shipped_directory("experiments") / f"{name}.yaml"
+    try:
+        content: Any = OmegaConf.to_container(OmegaConf.load(path))
+    except OSError as error:
+        raise ExneatError(f"{path}: could not be read: {error.strerror or error}") from error
+    except (ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
+        raise ExneatError(in_words(error, [path.parent])) from error
+    try:
+        return _experiment(path.stem, content)
+    except ExneatError as error:
+        raise ExneatError(f"{path}: {error}") from error
+
+
+def _experiment(name: str, content: Any) -> Experiment:
+    check_keys("", check_section("the file", content), ("claim", "settings", "variants", "conditions", "runs"))
+    experiment = build(Experiment, {**content, "name": name}, "")
+    check_text("claim", experiment.claim)
+    for part in ("variants", "conditions", "runs"):
+        if not check_section(part, content[part]):
+            raise ConfigError(part, "at least one entry", content[part])
+    for key in (name, *experiment.variants, *experiment.conditions):
+        if not isinstance(key, str) or not _NAME.fullmatch(key):
+            raise ConfigError("name", "at most 40 letters, digits, '.', '_' and '-'", key)
+    for budget, runs in experiment.runs.items():
+        check_choice("runs", budget, BUDGETS)
+        check_whole(f"runs.{budget}", runs, 1, 10_000)
+    return replace(
+        experiment,
+        settings=_settings("settings", experiment.settings),
+        variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
+        conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
+    )
+
+
+def _variant(key: str, entry: Any) -> Variant:
+    variant = build(Variant, entry, f"{key}.")
+    check_text(f"{key}.label", variant.label)
+    check_flag(f"{key}.swept", variant.swept)
+    if variant.runs is not None:
+        check_whole(f"{key}.runs", variant.runs, 1, 10_000)
+    return replace(variant, settings=_settings(f"{key}.settings", variant.settings))
+
+
+def _condition(key: str, entry: Any) -> Condition:
+    condition = build(Condition, entry, f"{key}.")
+    check_text(f"{key}.label", condition.label)
+    sweeps = condition.sweeps or []
+    if not isinstance(sweeps, list) or not all(isinstance(sweep, str) for sweep in sweeps):
+        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", sweeps)
+    return replace(condition, settings=_settings(f"{key}.settings", condition.settings))
+
+
+def _settings(key: str, values: Any) -> dict[str, Any]:
+    """Settings by dotted name; sections within sections are spelled out."""
+    flat = dict(_flat(check_section(key, values)))
+    for name, value in flat.items():
+        if re.split("[./]", name.lstrip("+~"))[0] in _SET_HERE:
+            raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
+    return flat
+
+
+def _flat(values: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from ((f"{name}.{inner}", each) for inner, each in _flat(value))
+        else:
+            yield str(name), value
+
+
+def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
+    """Plan every run of an experiment: jobs called ``<condition>/<variant>/<seed>``, in this order.
+
+    The user's own settings in `line` are for all runs, and win; those called `others` are none of the runs.
+
+    Raises:
+        ExneatError: settings make no sense, in at least one of the runs.
+    """
+    if budget not in experiment.runs:
+        raise ConfigError("budget", f"one that {experiment.name} has runs for, {', '.join(experiment.runs)}", budget)
+    jobs: list[Job] = []
+    for (place, condition), (name, variant) in product(experiment.conditions.items(), experiment.variants.items()):
+        settings = {
+            **experiment.settings,
+            **condition.settings,
+            **variant.settings,
+            "sweep": (condition.sweeps if variant.swept else None) or "none",
+            "name": f"{experiment.name}-{place}-{budget}",
+        }
+        try:
+            texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
+            composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
+            first = read_job("", composed, others)
+            for k in range(variant.runs or experiment.runs[budget]):
+                seeded = replace(first.settings, seed=first.settings.seed + k)
+                jobs.append(replace(first, name=f"{place}/{name}/{seeded.seed}", settings=seeded))
+        except ExneatError as error:
+            raise ExneatError(f"{experiment.name}, {place}, {name}: {error}") from error
+    places: dict[Path, Job] = {}
+    for job in jobs:
+        twin = places.setdefault(job.settings.directory.path, job)
+        if twin is not job:
+            raise ExneatError(f"{experiment.name}: {twin.name} and {job.name} are the same run; variants must differ")
+    return jobs
 
 
 def run(line: CommandLine) -> int:
@@ -28,11 +202,10 @@ def run(line: CommandLine) -> int:
         raise ConfigError("experiment", "a name or a YAML file, e.g. experiment=track_maze", asked["experiment"])
     experiment = read_experiment(asked["experiment"])
     jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
-    pending = [job for job in jobs if not (job.is_finished() and job.is_drawn())]
+    pending = [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
     before = len(jobs) - len(pending)
-    print(
-        f"{experiment.name}, budget {asked['budget']}: {len(jobs)} runs, {before} of them finished before", flush=True
-    )
+    counted = f"{len(jobs)} runs, {before} of them finished before"
+    print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
     reasons = [""] * len(pending)
     try:
         if pending:
@@ -73,12 +246,10 @@ def _unfinished_because(job: Job) -> str:
     directory = job.settings.directory
     if job.is_finished():
         return ""
-    if not directory.is_there():
-        return "it was not begun"
     try:
         manifest = directory.read_manifest()
     except ExneatError as error:
-        return str(error)
+        return str(error) if directory.is_there() else "it was not begun"
     if manifest.status == DONE:
         return "it was trained, but not tested at every level"
     return manifest.error or f"it did not finish (status {manifest.status})"

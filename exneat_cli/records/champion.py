@@ -15,8 +15,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from exneat_cli.algorithms import ACTIVATIONS, ArrayGenome, Candidate
+from exneat_cli.algorithms.neat.conversion import check_genes, check_genome
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
-from exneat_cli.algorithms.neat.soundness import check_genes, check_genome
 from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
 from exneat_cli.records.files import write_whole
@@ -75,7 +75,7 @@ class Genome(Struct, frozen=True, forbid_unknown_fields=True):
         nodes = [(each.id, each.bias, each.response, ACTIVATIONS.index(each.activation)) for each in self.nodes]
         connections = [(c.target, c.source, c.innovation, c.weight, c.enabled) for c in self.connections]
         genome.nodes, genome.connections = np.array(sorted(nodes), NODE), np.array(sorted(connections), CONNECTION)
-        check_genes(genome.key, genome.nodes, genome.connections)
+        check_genes(genome)
         return genome
 
 
@@ -101,7 +101,7 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def brain(self) -> Brains:
         """The runnable network."""
-        return assemble(self.plan, [genome.in_arrays() for genome in self.genomes], feed_forward=self.feed_forward)
+        return assemble(self.plan, [[genome.in_arrays() for genome in self.genomes]], feed_forward=self.feed_forward)
 
 
 def read_champion(path: Path) -> Champion:

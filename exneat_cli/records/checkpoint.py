@@ -39,11 +39,12 @@ def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str
         ExneatError: the file cannot be written; the older ones are still there then.
         ValueError: a number is not finite.
     """
-    newest = checkpoint.plain["generation"]
-    state = {"format": FORMAT, "configuration_hash": configuration_hash, **checkpoint.plain}
+    plain, arrays = checkpoint
+    newest = plain["generation"]
+    state = {"format": FORMAT, "configuration_hash": configuration_hash, **plain}
     text = np.frombuffer(json.dumps(state, allow_nan=False).encode(), np.uint8)
     buffer = io.BytesIO()
-    np.savez(buffer, **checkpoint.arrays, **{_STATE: text})  # type: ignore[arg-type]
+    np.savez(buffer, **arrays, **{_STATE: text})  # type: ignore[arg-type]
     write_whole(directory / f"checkpoint-{newest:06d}.npz", with_digest(buffer.getvalue()))
     # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
     kept = [path for path, generation in _found(directory) if generation <= newest][:KEPT]
@@ -83,7 +84,7 @@ def _read(path: Path, head: dict[str, Any]) -> State:
     for key, expected in head.items():
         if plain.pop(key, None) != expected:
             raise ExneatError(f"{path}: its {key} is not {expected}: it belongs to another run or version")
-    return State({"generation": head["generation"], **plain}, arrays)
+    return {"generation": head["generation"], **plain}, arrays
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:

@@ -23,15 +23,15 @@ from importlib.metadata import version
 from multiprocessing import resource_tracker
 from typing import Any
 
+import numpy as np
+
 import exneat_cli
 from exneat_cli.compiling import source_digest
 from exneat_cli.errors import ExneatError
-from exneat_cli.rollouts.episode import Acting, World
-from exneat_cli.rollouts.outcomes import Tally
+from exneat_cli.rollouts.episode import Acting, Tally, empty_tally, open_world, run_shares
 from exneat_cli.rollouts.settings import Executor, Noise
-from exneat_cli.rollouts.sharing import blocks
 from exneat_cli.seeding import EpisodeSeeds
-from exneat_cli.tasks import Task
+from exneat_cli.tasks import Simulation, Task
 
 WORTH_SECONDS = 0.05
 """A block takes at least this long, where there is so much to do: sending it costs 3 to 5 ms."""
@@ -39,6 +39,8 @@ PATIENCE_SECONDS = 60.0
 """How long a cluster may be without any worker."""
 CONNECT_SECONDS = 8
 """How long to wait for the scheduler at an address."""
+BLOCKS_PER_WORKER = 8
+"""So many blocks let workers end together."""
 
 _open: dict[Executor, _Cluster] = {}
 _users = 0
@@ -75,11 +77,7 @@ def cluster_of(executor: Executor) -> _Cluster:
 
 
 class _Cluster:
-    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files.
-
-    Args:
-        executor: of name ``dask``.
-    """
+    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files."""
 
     def __init__(self, executor: Executor) -> None:
         executor.check_installed()
@@ -118,7 +116,7 @@ class _Cluster:
         from distributed import KilledWorker
         from distributed.protocol.pickle import dumps
 
-        (brains, *added), moments = acting, bool(tally.means.size)
+        (brains, *added), moments = acting, bool(tally[-1].size)
         workers = self._threads() or 1 if self._own is None else self._executor.threads
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
         world, waiting = dumps(setup), {}
@@ -151,7 +149,7 @@ class _Cluster:
                 part, seconds = future.result()
                 for own, values in zip(tally, part, strict=True):
                     own[place] = values
-                pace = min(pace, seconds / part.steps.size)  # the longer ones loaded compiled code
+                pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
             if done or self._threads():
                 workers_seen = time.monotonic()
             elif time.monotonic() - workers_seen > PATIENCE_SECONDS:
@@ -206,16 +204,30 @@ async def _stop_workers(cluster: Any) -> None:
     await asyncio.gather(*stopping, return_exceptions=True)
 
 
+def blocks(brains: int, episodes: int, workers: int, smallest: int) -> list[tuple[slice, slice]]:
+    """Equal blocks of brains and episodes for the workers: whole rows if possible, so that a brain travels once.
+
+    Blocks hold at least `smallest` runs of a brain through an episode, if there is work for all.
+    """
+    runs = brains * episodes
+    wanted = min(runs, max(workers, min(BLOCKS_PER_WORKER * workers, runs // smallest)))
+    rows = max(1, min(brains, wanted))
+    columns = -(-wanted // rows)
+    return [(some, which) for some in _slices(brains, rows) for which in _slices(episodes, columns)]
+
+
+def _slices(count: int, parts: int) -> list[slice]:
+    return [slice(count * k // parts, count * (k + 1) // parts) for k in range(parts)]
+
+
 def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tally, float]:
     """Run some brains through some episodes, in a worker; returns what came out, and how many seconds it took.
 
-    Args:
-        expected: `versions` of the process that asks.
-        world: pickled task, noise, and whether this is training.
-        work: pickled `Acting`, episodes, and whether statistics of what is sensed are wanted.
+    Pickled are in `world` task, noise, and whether this is training; in `work` `Acting`, episodes, and whether
+    statistics of what is sensed are wanted.
 
     Raises:
-        ExneatError: a version differs.
+        ExneatError: a version differs from what is `expected`, that of the process that asks.
     """
     for name, wanted in expected.items():
         if (came := versions()[name]) != wanted:
@@ -226,16 +238,17 @@ def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tall
     try:
         own = idle.pop()
     except IndexError:  # no test before: another thread may take the last one in between
-        own = World(task, noise, training=training)
+        own = open_world(task, noise, training=training)
     brains, began = len(acting[0].size), time.perf_counter()
-    tally = Tally.empty(task, brains, len(episodes), moments=moments)
-    own.run([(episode, 0, brains) for episode in range(len(episodes))], acting, episodes, tally)
+    tally = empty_tally(task, brains, len(episodes), moments=moments)
+    shares = [(episode, 0, brains) for episode in range(len(episodes))]
+    run_shares(task, noise, np.zeros(1, np.bool_), own, shares, acting, episodes, tally)
     idle.append(own)
     return tally, time.perf_counter() - began
 
 
 @functools.lru_cache(4)  # a robustness sweep has another one at every level
-def _idle_worlds(world: bytes) -> list[World]:
+def _idle_worlds(world: bytes) -> list[Simulation]:
     """Opened worlds of this worker that nobody uses; take from and give back to it."""
     return []
 

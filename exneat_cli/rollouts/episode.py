@@ -16,119 +16,127 @@ from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import activate, memory_size
 from exneat_cli.compiling import compiled_lean, with_functions
 from exneat_cli.interruption import uninterrupted
-from exneat_cli.rollouts.outcomes import Tally
 from exneat_cli.rollouts.settings import Noise
-from exneat_cli.rollouts.sharing import Share
 from exneat_cli.seeding import EpisodeSeeds, generator
-from exneat_cli.tasks import RUNNING, HasInitialPose, HasTiles, Simulation, Task
+from exneat_cli.tasks import RUNNING, HasInitialPose, Simulation, Task
 
 Acting = tuple[Brains, NDArray[np.float64], NDArray[np.float64]]
 """Brains, and low and span, (A,) each: low + U(0, span) is added to their actions."""
+Share = tuple[int, int, int]
+"""An episode, the first brain that runs through it, and the one before which to stop."""
+Tally = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""What the loop writes for B brains in E episodes.
+
+How each ended, ``ENDED`` or ``FAILED``, and its control steps, (E, B); sums of the reward terms, (E, B, terms); means
+of what was sensed, and sums of squared deviations from them, (E, B, sensed), or (E, B, 0) where nobody asked.
+"""
+
+
+def empty_tally(task: Task, brains: int, episodes: int, *, moments: bool) -> Tally:
+    """Room for all of it, 0 everywhere."""
+    shape, sensed = (episodes, brains), task.sensed_size if moments else 0
+    statuses, steps = np.zeros((2, *shape), np.int64)
+    means, squares = np.zeros((2, *shape, sensed))
+    return statuses, steps, np.zeros((*shape, len(task.terms))), means, squares
 
 
 def _episodes(  # type: ignore[no-untyped-def]
     world, brains, first, last, world_rng, sensor_rng, action_rng, disturbance, buffers, halt, tally, trace, located
 ):
-    """Draw one world and run some brains through it, one after another, each from its start.
+    """Draw one world and run the brains from `first` to before `last` through it, each from its start.
 
-    The names reset, rewind, observe, sense, drive, step and locate are bound by `_loop_of`.
-
-    Args:
-        world: the task's storage.
-        brains: `Brains`.
-        first: brain to run.
-        last: brain before which to stop.
-        world_rng: Generator that draws the world.
-        sensor_rng: the same for the sensor noise, in the order of the readings.
-        action_rng: the same for what is added to the action.
-        disturbance: the sd of the sensor noise; the lowest and the highest noisy reading; low and span, (A,) each:
-            low + U(0, span) is added to the action.
-        buffers: to write into, see `World`; nothing in them outlives the call.
-        halt: (1,), set by another thread to stop.
-        tally: `Tally` of one episode; the entries of the brains that are run are overwritten.
-        trace: (steps + 1, located + terms) to record the path of the last one; rows that it lacks are left out.
-        located: how many columns of `trace` say where the agent is; the terms follow.
+    The names reset, rewind, observe, sense, drive, step and locate are bound by `_loop_of`; `disturbance` and `buffers`
+    are described in `run_shares` and `_buffers`. Another thread sets `halt`, (1,), to stop. `tally` is that of one
+    episode. `trace`, (steps + 1, located + terms), gets the path of the last brain; rows that it lacks are left out.
     """
     memory, readings, sensed, action, terms, sensor_noise, action_noise = buffers
-    sensor_std, lowest, highest, action_low, action_span = disturbance
-    means, squares = tally.means, tally.squares
-    clipped = highest < np.inf
+    statuses, steps, totals, means, squares = tally
     drawn = 0
     reset(world, world_rng)  # type: ignore[name-defined]  # noqa: F821
     for b in range(first, last):
         if b > first:
             rewind(world)  # type: ignore[name-defined]  # noqa: F821
         memory[:] = 0.0
-        tally.totals[b] = 0.0
+        terms[:] = 0.0
+        totals[b] = 0.0
         means[b] = 0.0
         squares[b] = 0.0
-        if located > 0 and trace.shape[0] > 0:
-            locate(world, trace[0, :located])  # type: ignore[name-defined]  # noqa: F821
         t = 0
         status = RUNNING
-        while status == RUNNING:
+        while True:
+            if t < trace.shape[0]:
+                if located > 0:
+                    locate(world, trace[t, :located])  # type: ignore[name-defined]  # noqa: F821
+                for i in range(terms.size):
+                    trace[t, located + i] = terms[i]
+            if status != RUNNING:
+                break
             if halt[0]:
                 return
             # Noise is drawn when the first brain needs it and kept for the others: all of them face the same.
             if t == drawn:
-                for i in range(sensor_noise.shape[1]):
-                    sensor_noise[t, i] = sensor_rng.normal(0.0, sensor_std)
-                for i in range(action_noise.shape[1]):
-                    action_noise[t, i] = action_low[i] + action_span[i] * action_rng.random()
+                _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise[t], action_noise[t])
                 drawn += 1
-
-            # Observe: (observation size,) readings, then noise and clipping in place.
             observe(world, readings)  # type: ignore[name-defined]  # noqa: F821
-            for i in range(sensor_noise.shape[1]):
-                readings[i] += sensor_noise[t, i]
-            if clipped:
-                for i in range(readings.size):
-                    readings[i] = min(max(readings[i], lowest), highest)
-
-            # Sense: (sensed size,) head of the memory, and its statistics (Welford, "Note on a method for calculating
-            # corrected sums of squares and products", 1962); means has no columns where nobody asked for them.
+            _disturb(readings, sensor_noise[t], disturbance)
             sense(world, readings, sensed)  # type: ignore[name-defined]  # noqa: F821
-            for i in range(means.shape[1]):
-                deviation = sensed[i] - means[b, i]
-                means[b, i] += deviation / (t + 1)
-                squares[b, i] += deviation * (sensed[i] - means[b, i])
-
-            # Brain, action noise, drive, step: (A,) action in place, (terms,) rewards.
+            _add_moments(sensed, t, means[b], squares[b])
             activate(brains, b, memory, action)
             for i in range(action_noise.shape[1]):
                 action[i] += action_noise[t, i]
             drive(world, action)  # type: ignore[name-defined]  # noqa: F821
             status = step(world, action, terms)  # type: ignore[name-defined]  # noqa: F821
             for i in range(terms.size):
-                tally.totals[b, i] += terms[i]
+                totals[b, i] += terms[i]
             t += 1
-
-            if t < trace.shape[0]:
-                if located > 0:
-                    locate(world, trace[t, :located])  # type: ignore[name-defined]  # noqa: F821
-                for i in range(terms.size):
-                    trace[t, located + i] = terms[i]
-        tally.status[b] = status
-        tally.steps[b] = t
+        statuses[b] = status
+        steps[b] = t
 
 
 @compiled_lean
-def _sense_readings(world, readings, sensed):  # type: ignore[no-untyped-def]
-    """Leave it at the readings, which lie where what is sensed does."""
+def _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise):  # type: ignore[no-untyped-def]
+    """Draw one step's noise on the readings and on the action, in their order."""
+    sensor_std, _, _, action_low, action_span = disturbance
+    for i in range(sensor_noise.size):
+        sensor_noise[i] = sensor_rng.normal(0.0, sensor_std)
+    for i in range(action_noise.size):
+        action_noise[i] = action_low[i] + action_span[i] * action_rng.random()
 
 
 @compiled_lean
-def _drive_as_told(world, action):  # type: ignore[no-untyped-def]
-    """Leave the action as it is."""
+def _disturb(readings, noise, disturbance):  # type: ignore[no-untyped-def]
+    """Add noise to the readings and clip them, in place."""
+    _, lowest, highest, _, _ = disturbance
+    for i in range(noise.size):
+        readings[i] += noise[i]
+    if highest < np.inf:
+        for i in range(readings.size):
+            readings[i] = min(max(readings[i], lowest), highest)
+
+
+@compiled_lean
+def _add_moments(sensed, t, means, squares):  # type: ignore[no-untyped-def]
+    """Count in what is sensed at step t; `means` and `squares` are empty where nobody asked for them.
+
+    Source: Welford, "Note on a method for calculating corrected sums of squares and products", 1962.
+    """
+    for i in range(means.size):
+        deviation = sensed[i] - means[i]
+        means[i] += deviation / (t + 1)
+        squares[i] += deviation * (sensed[i] - means[i])
+
+
+@compiled_lean
+def _unchanged(world, *values):  # type: ignore[no-untyped-def]
+    """Leave the readings, which lie where what is sensed does, or the action as they are, or locate nothing."""
 
 
 def _loop_of(simulation: Simulation, task: str) -> Callable[..., Any]:
     """The loop for one kind of world, whose task has this name: compiled if the world is, else plain Python."""
     names = ("reset", "rewind", "observe", "sense", "drive", "step", "locate")
-    defaults: dict[str, Any] = {"sense": _sense_readings, "drive": _drive_as_told}
-    if not simulation.compiled:  # its world may be something that compiled code cannot take
-        defaults = {name: function.py_func for name, function in defaults.items()}
-    functions = {name: getattr(simulation, name) or defaults[name] for name in names}
+    # The world of plain functions may be something that compiled code cannot take.
+    default = _unchanged if simulation.compiled else _unchanged.py_func  # type: ignore[attr-defined]
+    functions = {name: getattr(simulation, name) or default for name in names}
     return _compiled_loop(task, **functions) if simulation.compiled else with_functions(_episodes, task, **functions)
 
 
@@ -137,79 +145,67 @@ def _compiled_loop(task: str, **functions: Callable[..., Any]) -> Callable[..., 
     return compiled_lean(with_functions(_episodes, f"episodes_of_{task}", **functions))
 
 
-class World:
-    """An opened world; use it from one thread at a time.
-
-    Args:
-        task: what is simulated.
-        noise: what disturbs the agent.
-        training: switches on the task's early stopping.
-        halt: (1,), set by another thread to stop; left out, nothing stops it.
+def open_world(task: Task, noise: Noise, *, training: bool) -> Simulation:
+    """Open a world of a task, under this noise on its initial pose if it has one.
 
     Raises:
         ValueError: the world has no `sense`, but its task says that brains sense something else than the readings.
     """
-
-    def __init__(self, task: Task, noise: Noise, *, training: bool, halt: NDArray[np.bool_] | None = None) -> None:
-        self._task = task
-        self._sensor_std = float(noise.sensor_std)
-        self._simulation = _open(task, noise, training=training)
-        if self._simulation.sense is None and task.sensed_size != task.observation_size:
-            sizes = f"{task.sensed_size} entries of {task.observation_size} readings"
-            raise ValueError(f"task {task.name}: expected a simulation with `sense`, since brains sense {sizes}")
-        self._loop = _loop_of(self._simulation, task.name)
-        self._halt = np.zeros(1, dtype=np.bool_) if halt is None else halt
-
-    def run(
-        self,
-        shares: Iterable[Share],
-        acting: Acting,
-        episodes: Sequence[EpisodeSeeds],
-        tally: Tally,
-        trace: NDArray[np.float64] | None = None,
-    ) -> None:
-        """Run brains through episodes.
-
-        Args:
-            shares: which of them; taken one by one.
-            acting: who acts.
-            episodes: that shares count.
-            tally: of all of them; what belongs to `shares` is overwritten.
-            trace: (steps + 1, columns) to record the path of the last one, see `Trace`.
-        """
-        brains, action_low, action_span = acting
-        buffers = self._buffers(brains, noisy_action=bool(action_low.any() or action_span.any()))
-        disturbance = (self._sensor_std, *map(float, self._task.observation_limits), action_low, action_span)
-        world, halt, located = self._simulation.world, self._halt, len(self._task.trace_columns)
-        if trace is None:
-            trace = np.zeros((0, located + len(self._task.terms)))
-        for episode, *chosen in shares:
-            rngs, own = map(generator, episodes[episode]), Tally(*(values[episode] for values in tally))
-            with uninterrupted():
-                self._loop(world, brains, *chosen, *rngs, disturbance, buffers, halt, own, trace, located)
-
-    def tiles(self) -> NDArray[np.float64] | None:
-        """The world as the last episode left it, see `HasTiles`; None where there are no tiles."""
-        return self._task.tiles(self._simulation.world) if isinstance(self._task, HasTiles) else None
-
-    def _buffers(self, brains: Brains, *, noisy_action: bool) -> tuple[NDArray[np.float64], ...]:
-        """What the loop writes into: noise has no columns where there is none."""
-        task, memory = self._task, np.zeros(memory_size(brains))
-        inputs, actions, steps = task.observation_size, len(task.actuator_names), task.longest_episode
-        sensed = memory[: task.sensed_size]
-        return (
-            memory,  # values of the largest brain and a scratch entry for each of its nodes
-            # (inputs,) readings: without a `sense` they need no copying, since they are what is sensed.
-            sensed if self._simulation.sense is None else np.zeros(inputs),
-            sensed,
-            np.zeros(actions),
-            np.zeros(len(task.terms)),
-            np.zeros((steps, inputs if self._sensor_std > 0.0 else 0)),  # noise of the sensors
-            np.zeros((steps, actions if noisy_action else 0)),  # of the action
-        )
-
-
-def _open(task: Task, noise: Noise, *, training: bool) -> Simulation:
     if isinstance(task, HasInitialPose):
-        return task.open_disturbed(training=training, reset_scale=noise.reset_scale)
-    return task.open(training=training)
+        simulation = task.open_disturbed(training=training, reset_scale=noise.reset_scale)
+    else:
+        simulation = task.open(training=training)
+    if simulation.sense is None and task.sensed_size != task.observation_size:
+        sizes = f"{task.sensed_size} entries of {task.observation_size} readings"
+        raise ValueError(f"task {task.name}: expected a simulation with `sense`, since brains sense {sizes}")
+    return simulation
+
+
+def run_shares(
+    task: Task,
+    noise: Noise,
+    halt: NDArray[np.bool_],
+    simulation: Simulation,
+    shares: Iterable[Share],
+    acting: Acting,
+    episodes: Sequence[EpisodeSeeds],
+    tally: Tally,
+    trace: NDArray[np.float64] | None = None,
+) -> None:
+    """Run brains through episodes of a world that was opened for this task and noise.
+
+    `shares` say which, and are taken one by one; `episodes` are those that they count. In the `tally` of all of them,
+    what belongs to `shares` is overwritten. Another thread sets `halt`, (1,), to stop. `trace`, (steps + 1, columns),
+    is to record the path of the last one, see `Trace`.
+    """
+    brains, action_low, action_span = acting
+    # Sd of the sensor noise, the lowest and the highest noisy reading, and `Acting` on the action.
+    disturbance = (float(noise.sensor_std), *map(float, task.observation_limits), action_low, action_span)
+    noisy = noise.sensor_std > 0.0, bool(action_low.any() or action_span.any())
+    buffers = _buffers(task, simulation, brains, *noisy)
+    loop, located = _loop_of(simulation, task.name), len(task.trace_columns)
+    if trace is None:
+        trace = np.zeros((0, located + len(task.terms)))
+    for episode, *chosen in shares:
+        rngs, own = map(generator, episodes[episode]), tuple(values[episode] for values in tally)
+        with uninterrupted():
+            loop(simulation.world, brains, *chosen, *rngs, disturbance, buffers, halt, own, trace, located)
+
+
+def _buffers(
+    task: Task, simulation: Simulation, brains: Brains, noisy_readings: bool, noisy_action: bool
+) -> tuple[NDArray[np.float64], ...]:
+    """What the loop writes into, nothing of which outlives a call: noise has no columns where there is none."""
+    memory, steps = np.zeros(memory_size(brains)), task.longest_episode
+    inputs, actions = task.observation_size, len(task.actuator_names)
+    sensed = memory[: task.sensed_size]
+    return (
+        memory,  # values of the largest brain and a scratch entry for each of its nodes
+        # (inputs,) readings: without a `sense` they need no copying, since they are what is sensed.
+        sensed if simulation.sense is None else np.zeros(inputs),
+        sensed,
+        np.zeros(actions),
+        np.zeros(len(task.terms)),
+        np.zeros((steps, inputs if noisy_readings else 0)),  # noise of the sensors
+        np.zeros((steps, actions if noisy_action else 0)),  # of the action
+    )

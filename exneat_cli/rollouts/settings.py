@@ -52,7 +52,8 @@ class Executor:
         """Number of threads that run at once, in this process or in workers that it starts."""
         if self.name == "serial":
             return 1
-        return self.workers or _usable_cores()
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return self.workers or cores
 
     def check_installed(self) -> None:
         """Refuse to begin without the library that this executor needs.
@@ -62,12 +63,6 @@ class Executor:
         """
         if self.name == "dask" and find_spec("distributed") is None:
             raise ExneatError("executor=dask: expected dask, which is not installed\n  pip install 'exneat[dask]'")
-
-
-def _usable_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -99,6 +94,7 @@ class Sweep:
         name: e.g. ``sensor_noise``.
         parameter: the setting, below ``task.`` or ``noise.``.
         levels: its values, all different.
+        label: of its axis in figures.
 
     Raises:
         ConfigError: there are no levels, or one is no finite number or comes twice.
@@ -107,6 +103,7 @@ class Sweep:
     name: str
     parameter: str
     levels: tuple[float, ...]
+    label: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "levels", tuple(self.levels))

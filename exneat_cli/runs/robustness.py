@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from exneat_cli.brains import Brains, RandomActions, acting_by_rule
+from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
@@ -118,7 +118,7 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
     merge_robustness(directory.robustness, rows)
 
 
-def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | RandomActions:
+def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | None:
     if settings.algorithm.rule is not None:
         return acting_by_rule(settings.algorithm.rule, settings.task)
     champion = read_champion(directory.champion)

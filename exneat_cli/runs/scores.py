@@ -85,7 +85,7 @@ def measure_baseline(settings: RunSettings, directory: RunDirectory) -> Result:
 
 
 def _compile(settings: RunSettings, team: Team) -> Brains:
-    return assemble(settings.plan, team.genomes, feed_forward=settings.evolution.feed_forward)
+    return assemble(settings.plan, [team.genomes], feed_forward=settings.evolution.feed_forward)
 
 
 def _standing_still(settings: RunSettings) -> Brains:
@@ -105,11 +105,11 @@ def _champion(settings: RunSettings, team: Team, scores: Scores) -> Champion:
 
 
 def _write_trace(settings: RunSettings, directory: RunDirectory, trace: Trace) -> None:
-    columns = ("step", *settings.task.trace_columns, *settings.task.terms)
-    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(trace.steps.tolist())])
-    if trace.tiles is not None:
-        tiles = [(*place, *trace.tiles[place].tolist()) for place in np.ndindex(trace.tiles.shape[:2])]
-        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), tiles)
+    columns, (steps, tiles) = ("step", *settings.task.trace_columns, *settings.task.terms), trace
+    write_csv(directory.trace, columns, [(step, *row) for step, row in enumerate(steps.tolist())])
+    if tiles is not None:
+        rows = [(*place, *tiles[place].tolist()) for place in np.ndindex(tiles.shape[:2])]
+        write_csv(directory.tiles, ("row", "column", "path", "channel_1", "channel_2"), rows)
 
 
 def score_all(outcomes: Outcomes) -> list[Score]:
@@ -133,7 +133,8 @@ def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     tests = shared_episodes("test", episodes)
     if settings.algorithm.rule != "random":
         return tests
-    return [each._replace(actions=stream(settings.seed, "random_actions", k)) for k, each in enumerate(tests)]
+    root = settings.seed
+    return [(world, noise, stream(root, "random_actions", k)) for k, (world, noise, _) in enumerate(tests)]
 
 
 def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:

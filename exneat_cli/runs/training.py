@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.records import HISTORY_COLUMNS, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.runs.settings import RunSettings
@@ -52,7 +52,7 @@ class Training:
             if isinstance(checkpoint, str):
                 say(checkpoint)
                 continue
-            generation = checkpoint.plain["generation"]
+            generation = checkpoint[0]["generation"]
             try:
                 training = cls._restored(settings, checkpoint)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -65,12 +65,12 @@ class Training:
     @classmethod
     def _restored(cls, settings: RunSettings, checkpoint: State) -> Training:
         """The training that `checkpoint` was taken of, unless it is damaged or of other settings."""
-        problem, plain = _problem(settings), checkpoint.plain
+        problem, (plain, arrays) = _problem(settings), checkpoint
         history = [_sound(number, row) for number, row in enumerate(plain["history"], start=1)]
         if not 1 <= len(history) == plain["generation"] <= settings.generations:
             raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
-        (first,) = unpack_teams(checkpoint.arrays, _FIRST, problem)
-        search = settings.algorithm.restored(problem, State(plain["search"], checkpoint.arrays))
+        (first,) = unpack_teams(arrays, _FIRST, problem)
+        search = settings.algorithm.restored(problem, (plain["search"], arrays))
         return cls(settings, search, history, first, time.perf_counter() - history[-1]["wall_seconds"])
 
     @property
@@ -84,13 +84,13 @@ class Training:
         teams: list[Team] = []
         outcomes: list[Outcomes] = []
         while not over:
-            trials = self.search.ask()
-            genomes = [team.genomes for team in trials.teams]
-            brains = assemble_all(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
+            asked, count = self.search.ask()
+            genomes = [team.genomes for team in asked]
+            brains = assemble(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
             done = sum(each.steps.shape[1] for each in outcomes)
-            episodes = training_episodes(settings.seed, len(self.history), trials.episodes, first=done)
+            episodes = training_episodes(settings.seed, len(self.history), count, first=done)
             outcomes.append(runner.run(brains, episodes, moments=settings.algorithm.wants_moments))
-            teams += trials.teams
+            teams += asked
             over = self.search.tell(_results(settings, outcomes[-1]))
         self._record(teams, outcomes)
 
@@ -123,9 +123,9 @@ class Training:
     def checkpoint(self) -> State:
         """All that the rest of the training depends on; taking it changes nothing."""
         assert self.first_generation is not None
-        search = self.search.state()
-        plain = {"generation": len(self.history), "search": search.plain, "history": self.history}
-        return State(plain, {**search.arrays, **pack_teams([self.first_generation], _FIRST)})
+        search, arrays = self.search.state()
+        plain = {"generation": len(self.history), "search": search, "history": self.history}
+        return plain, {**arrays, **pack_teams([self.first_generation], _FIRST)}
 
 
 def _problem(settings: RunSettings) -> Problem:

@@ -5,9 +5,8 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
-from exneat_cli.tasks.grid.general_maze import GeneralMaze
+from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
-from exneat_cli.tasks.grid.track_maze import TrackMaze
 from exneat_cli.tasks.grid.world import GridTask
 from exneat_cli.tasks.robots.robot import AntTask, RobotTask
 from exneat_cli.tasks.task import (

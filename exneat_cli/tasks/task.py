@@ -10,8 +10,6 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.compiling import compiled_lean
-
 RUNNING = 0
 """The episode goes on."""
 ENDED = 1
@@ -49,11 +47,6 @@ class Part:
     trunk: tuple[int, ...] = ()
 
 
-@compiled_lean
-def locate_nowhere(world, row):  # type: ignore[no-untyped-def]
-    """Write nothing: for worlds in which the agent has no place."""
-
-
 @dataclass(frozen=True)
 class Simulation:
     """One world and the functions that run episodes in it; use it from one thread at a time.
@@ -68,7 +61,8 @@ class Simulation:
         observe: ``observe(world, readings)`` writes the noiseless readings, (`Task.observation_size`,).
         step: ``step(world, action, terms)`` acts once, writes this step's reward terms and returns
             `RUNNING`, `ENDED` or `FAILED`.
-        locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`.
+        locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`; None where it
+            has no place.
         sense: ``sense(world, readings, sensed)`` turns noisy readings into what brains sense,
             (`Task.sensed_size`,); None where that is the same.
         drive: ``drive(world, action)`` turns what brains put out into what `step` takes, in place; None where
@@ -82,7 +76,7 @@ class Simulation:
     rewind: Callable[..., Any]
     observe: Callable[..., Any]
     step: Callable[..., Any]
-    locate: Callable[..., Any] = locate_nowhere
+    locate: Callable[..., Any] | None = None
     sense: Callable[..., Any] | None = None
     drive: Callable[..., Any] | None = None
     compiled: bool = True

@@ -37,26 +37,21 @@ def merged(parts: Iterable[Moments], size: int) -> Moments:
 
 
 def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:
-    """Of each subpopulation, the moments of its pins, (pins,), over teams and the modules that share it.
+    """Of each subpopulation, the moments of its pins, (pins,), over `teams`, (T, sensed), and modules that share it.
 
     Teams are merged in their order, within a team modules in theirs. Pins that read modules count 0.
-
-    Args:
-        plan: who senses what.
-        teams: (T, sensed) of what each team's brain sensed.
     """
     found = []
-    for index, (pins, _, _) in enumerate(plan.subpopulation_shapes):
-        sharers = [module for module in plan.modules if module.subpopulation == index]
-        parts = [
-            _of_pins(teams, t, [pin.index if pin.is_sensor else -1 for pin in module.pins])
-            for t in range(len(teams.counts))
-            for module in sharers
+    for index, (count, _, _) in enumerate(plan.subpopulation_shapes):
+        entries = [
+            np.array([pin.index if pin.is_sensor else -1 for pin in module.pins], np.int64)
+            for module in plan.modules
+            if module.subpopulation == index
         ]
-        found.append(merged(parts, pins))
+        parts = [
+            Moments(*(np.where(own >= 0, values[team, own], 0.0) for values in teams))
+            for team in range(len(teams.counts))
+            for own in entries
+        ]
+        found.append(merged(parts, count))
     return tuple(found)
-
-
-def _of_pins(teams: Moments, team: int, entries: list[int]) -> Moments:
-    senses = np.array(entries) >= 0
-    return Moments(*(np.where(senses, values[team, entries], 0.0) for values in teams))

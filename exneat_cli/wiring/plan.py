@@ -6,7 +6,6 @@ come in the order in which genomes see them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 CENTRAL = "central"
@@ -100,8 +99,13 @@ class Plan:
         actuators = [actuator for module in self.modules for actuator in module.drives]
         if len(set(actuators)) < len(actuators):
             raise ValueError("two outputs drive the same actuator")
-        for module in self.modules:
-            self._check_sharers(module)
+        first_sharer: dict[int, int] = {}
+        for m, module in enumerate(self.modules):
+            first = first_sharer.setdefault(module.subpopulation, m)
+            other = self.modules[first]
+            # Compiled brains size a network by one of the modules that share its genome: the others must agree.
+            if module.shape != other.shape or self.hidden_is_linked(m) != self.hidden_is_linked(first):
+                raise ValueError(f"{other.name} and {module.name} share genomes, but not numbers of pins and nodes")
             if not all(0 <= actuator < self.action_size for actuator in module.drives):
                 raise ValueError(f"{module.name} drives an actuator that does not exist: {module.drives}")
             if len(module.drives) > module.outputs:
@@ -109,15 +113,6 @@ class Plan:
             for pin in module.pins:
                 if not 0 <= pin.index < self._readable(pin):
                     raise ValueError(f"{module.name} has a pin that reads what does not exist: {pin}")
-
-    def _check_sharers(self, module: Module) -> None:
-        """Compiled brains size a network by one of the modules that share its genome: the others must agree."""
-        for m, other in enumerate(self.modules):
-            if other.subpopulation != module.subpopulation:
-                continue
-            alike = self.hidden_is_linked(m) == self.hidden_is_linked(self.modules.index(module))
-            if other.shape != module.shape or not alike:
-                raise ValueError(f"{module.name} and {other.name} share genomes, but not numbers of pins and nodes")
 
     def _readable(self, pin: Pin) -> int:
         if pin.is_sensor:
@@ -137,8 +132,3 @@ class Plan:
         """Whether another module reads hidden nodes of `module`."""
         first = self.modules[module].outputs
         return any(pin.module == module and pin.index >= first for m in self.modules for pin in m.pins)
-
-
-def sensor_pins(indices: Sequence[int]) -> tuple[Pin, ...]:
-    """One pin per entry of the observation."""
-    return tuple(Pin(index) for index in indices)

@@ -1,9 +1,10 @@
-"""Ask and tell over subpopulations: equality with neat-python, pairing, ties, failures."""
+"""Ask and tell over subpopulations: equality with neat-python, pairing, ties, failures, hall of fame."""
 
 from __future__ import annotations
 
 import math
 import random
+from collections.abc import Iterable
 from dataclasses import replace
 
 import neat
@@ -12,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exneat_cli.algorithms import Coevolution, EvolutionSettings, from_stock, neat_config, to_stock
-from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties
+from exneat_cli.algorithms import Candidate, Coevolution, EvolutionSettings, Team, from_stock, neat_config, to_stock
+from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties, with_candidate
 from exneat_cli.seeding import stream
 from tests.algorithms.problems import contents, problem_of, synthetic, tell
 
@@ -43,7 +44,7 @@ def test_one_subpopulation_evolves_exactly_like_neat_population() -> None:
     ours = Coevolution(problem_of(settings, 40, shape=shape, pairing="index", seed=7))
     species = set()
     for generation in range(8):
-        teams = ours.ask().teams
+        teams = ours.ask()[0]
         assert [contents(team.genomes[0]) for team in teams] == theirs[generation]
         species.add(ours.columns()["species"])
         tell(ours, [fitness_of(to_stock(team.genomes[0])) for team in teams])
@@ -59,12 +60,12 @@ def test_the_best_team_meets_the_next_generation_intact(genome: str, subpopulati
     rng = np.random.default_rng(subpopulations)
     most_species = 0
     for _ in range(30):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         values = [float(rng.integers(0, 3)) if tied else synthetic(team) for team in teams]
         tell(evolution, values)
         best = [team for team, value in zip(teams, values, strict=True) if value == max(values)]
         before = [contents(genome) for genome in best[0].genomes]
-        following = evolution.ask().teams
+        following = evolution.ask()[0]
         # neat-python itself breaks the ties of a lone population; several follow the order of the teams.
         allowed = best if subpopulations == 1 else best[:1]
         assert {team.ids for team in following} & {team.ids for team in allowed}
@@ -79,7 +80,7 @@ def test_the_best_team_meets_the_next_generation_intact(genome: str, subpopulati
 def test_index_pairing_keeps_neat_pythons_order() -> None:
     evolution = Coevolution(problem_of(EvolutionSettings(), 12, 2, pairing="index", seed=1))
     for _ in range(3):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         for index, subpopulation in enumerate(evolution._subpopulations):
             assert [team.ids[index] for team in teams] == list(subpopulation.genomes)
         tell(evolution, [synthetic(team) for team in teams])
@@ -91,7 +92,7 @@ def test_initial_hidden_nodes_have_the_same_ids_also_after_an_extinction(genome:
     evolution = Coevolution(problem_of(settings, 10, 2))
     extinctions = 0
     for _ in range(12):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         if evolution.columns()["extinctions"] == 2:
             extinctions += 1
             assert all(genome.nodes["key"].tolist() == [0, 1, 2] for team in teams for genome in team.genomes)
@@ -117,10 +118,10 @@ def test_ask_and_tell_refuse_to_be_called_out_of_turn() -> None:
 
 def test_a_team_that_failed_is_no_candidate_and_loses_to_all_others() -> None:
     evolution = Coevolution(problem_of(EvolutionSettings(), 10, 2))
-    teams = evolution.ask().teams
+    teams = evolution.ask()[0]
     tell(evolution, [float(k) for k in range(10)], failed=[8, 9])
     assert evolution.candidates()[0].team is teams[7]
-    assert evolution.ask().teams[0].ids == teams[7].ids
+    assert evolution.ask()[0][0].ids == teams[7].ids
 
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.sampled_from([0.0, -0.0, 1.0, -100.0]), min_size=1, max_size=60))
@@ -147,10 +148,39 @@ def test_one_seed_repeats_another_differs_and_pythons_random_state_stays(genome:
     def run(seed: int) -> list[object]:
         evolution = Coevolution(problem_of(EvolutionSettings(genome=genome), 10, 2, seed=seed))
         for _ in range(3):
-            tell(evolution, [synthetic(team) for team in evolution.ask().teams])
-        return [contents(genome) for team in evolution.ask().teams for genome in team.genomes]
+            tell(evolution, [synthetic(team) for team in evolution.ask()[0]])
+        return [contents(genome) for team in evolution.ask()[0] for genome in team.genomes]
 
     before = random.getstate()
     assert run(0) == run(0)
     assert run(0) != run(1)
     assert random.getstate() == before
+
+
+def hall_of(offers: Iterable[tuple[int, float]]) -> list[Candidate]:
+    """The hall of fame after these teams and figures, one per generation."""
+    hall: list[Candidate] = []
+    for generation, (key, fitness) in enumerate(offers):
+        hall = with_candidate(hall, Candidate(Team((), (key,)), fitness, generation))
+    return hall
+
+
+@pytest.mark.parametrize(
+    ("offered", "kept"),
+    [([50.0, 100.0, 91.0, 90.0, 89.9], [100.0, 91.0, 90.0]), ([-10.0, -10.9, -11.1], [-10.0, -10.9])],
+)
+def test_only_teams_within_a_tenth_of_the_best_stay(offered: list[float], kept: list[float]) -> None:
+    assert [entry.fitness for entry in hall_of(enumerate(offered))] == kept
+
+
+def test_a_team_that_comes_again_keeps_its_best_figure_and_one_place() -> None:
+    (entry,) = hall_of([(1, 100.0), (1, 97.0), (1, 103.0), (1, 102.0)])
+    assert (entry.fitness, entry.generation) == (103.0, 2)
+
+
+@given(st.lists(st.tuples(st.integers(0, 30), st.floats(-100, 100)), min_size=1, max_size=100))
+def test_at_most_twenty_unique_teams_best_first_and_the_best_ever_among_them(offers: list[tuple[int, float]]) -> None:
+    hall = hall_of(offers)
+    assert len({entry.team.ids for entry in hall}) == len(hall) <= 20
+    assert [entry.fitness for entry in hall] == sorted((entry.fitness for entry in hall), reverse=True)
+    assert hall[0].fitness == max(fitness for _, fitness in offers)

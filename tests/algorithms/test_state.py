@@ -19,7 +19,7 @@ def begun(problem: Problem, generations: int) -> tuple[Coevolution, np.random.Ge
     """A co-evolution that was told the fitness of so many generations, and what draws the next."""
     evolution, rng = Coevolution(problem), np.random.default_rng(0)
     for _ in range(generations):
-        tell(evolution, rng.integers(0, 9, len(evolution.ask().teams)).astype(float).tolist())
+        tell(evolution, rng.integers(0, 9, len(evolution.ask()[0])).astype(float).tolist())
     return evolution, rng
 
 
@@ -27,7 +27,7 @@ def go_on(evolution: Coevolution, rng: np.random.Generator) -> list[object]:
     """Everything that can be seen of three more generations."""
     seen: list[object] = []
     for _ in range(3):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         seen += [[contents(genome) for team in teams for genome in team.genomes], evolution.columns()]
         tell(evolution, rng.normal(size=len(teams)).tolist(), failed=[3])
         seen += [(entry.fitness, entry.generation, entry.team.ids) for entry in evolution.candidates()]
@@ -35,7 +35,8 @@ def go_on(evolution: Coevolution, rng: np.random.Generator) -> list[object]:
 
 
 def through_json(state: State) -> State:
-    return State(json.loads(json.dumps(state.plain)), {name: column.copy() for name, column in state.arrays.items()})
+    plain, arrays = state
+    return json.loads(json.dumps(plain)), {name: column.copy() for name, column in arrays.items()}
 
 
 @pytest.mark.parametrize("genome", ["array", "stock"])
@@ -57,10 +58,10 @@ def test_going_on_from_a_state_is_going_on(genome: str, stagnation: int, subpopu
 def test_taking_a_state_changes_nothing_and_it_does_not_change_later(genome: str) -> None:
     problem = problem_of(EvolutionSettings(genome=genome), POPULATION, 2, seed=4)
     undisturbed, watched = begun(problem, 3), begun(problem, 3)
-    state = watched[0].state()
-    before = json.dumps(state.plain)
+    plain, _ = watched[0].state()
+    before = json.dumps(plain)
     assert go_on(*watched) == go_on(*undisturbed)
-    assert json.dumps(state.plain) == before
+    assert json.dumps(plain) == before
 
 
 def test_no_state_is_taken_of_a_generation_without_fitness() -> None:
@@ -112,7 +113,7 @@ def test_a_state_that_does_not_fit_together_is_refused(index: int) -> None:
         (own,) = plain["subpopulations"]
         own |= WRONG_SUBPOPULATIONS[index - len(WRONG_TEAMS)](own)
     with pytest.raises((ArithmeticError, AttributeError, LookupError, TypeError, ValueError)):
-        Coevolution(problem, State(plain, arrays))
+        Coevolution(problem, (plain, arrays))
 
 
 def test_a_state_of_another_population_is_refused() -> None:
@@ -145,7 +146,7 @@ def test_columns_that_make_no_genomes_are_refused(name: str, value: Any) -> None
     plain, arrays = begun(problem, 3)[0].state()
     changed = {**arrays, f"current.0.{name}": value(arrays[f"current.0.{name}"])}
     with pytest.raises(ValueError):
-        Coevolution(problem, State(plain, changed))
+        Coevolution(problem, (plain, changed))
     del changed[f"current.0.{name}"]
     with pytest.raises(KeyError, match=name):
-        Coevolution(problem, State(plain, changed))
+        Coevolution(problem, (plain, changed))

@@ -13,8 +13,7 @@ from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.compiling import compiled
 from exneat_cli.seeding import generator
 from exneat_cli.tasks import RUNNING, AntTask, Simulation
-from exneat_cli.tasks.robots.dynamics import AntWorld, observe, step
-from exneat_cli.tasks.robots.mujoco_library import mj_rnePostConstraint, mj_step
+from exneat_cli.tasks.robots.dynamics import AntWorld, mj_rnePostConstraint, mj_step, observe, step
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import TASK, Workload, open_runner
 
@@ -82,7 +81,7 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
     recordings = [record(TASK, simulation, lay_out(brains), b) for b in range(len(brains))]
     with open_runner(threads=1) as runner:
         for brain, recording in zip(brains, recordings, strict=True):
-            check_x("step by step", recording.final_x, float(runner.trace(brain, seeds).steps[-1, 0]))
+            check_x("step by step", recording.final_x, float(runner.trace(brain, seeds)[0][-1, 0]))
         pairs = [
             Pair(
                 partial(seconds_of, partial(runner.run, [brain], [seeds])), partial(_replay_one, simulation, recording)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from exneat_cli.algorithms import Coevolution, EvolutionSettings, Problem, Results
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
@@ -46,7 +46,7 @@ class Growing:
         self._plan, settings = plan, EvolutionSettings()
         self.coevolution = Coevolution(Problem(plan, settings, population, episodes=1, pairing="rank", seed=root))
         self._rng = np.random.default_rng(root)
-        self._teams = self.coevolution.ask().teams
+        self._teams = self.coevolution.ask()[0]
 
     def advance(self) -> float:
         """Wall seconds of all that a generation is but its episodes: tell, ask and making the brains."""
@@ -56,8 +56,8 @@ class Growing:
 
     def _advance(self, results: Results) -> None:
         self.coevolution.tell(results)
-        self._teams = self.coevolution.ask().teams
-        assemble_all(self._plan, [team.genomes for team in self._teams], feed_forward=True)
+        self._teams = self.coevolution.ask()[0]
+        assemble(self._plan, [team.genomes for team in self._teams], feed_forward=True)
 
     @property
     def connections(self) -> float:

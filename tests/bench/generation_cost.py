@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brains, RandomActions
+from exneat_cli.brains import Brains
 from exneat_cli.compiling import compiled
 from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
@@ -55,11 +55,7 @@ class WatchedRunner(Runner):
         return self
 
     def run(
-        self,
-        brains: Brains | Sequence[Brains] | RandomActions,
-        episodes: Sequence[EpisodeSeeds],
-        *,
-        moments: bool = False,
+        self, brains: Brains | Sequence[Brains] | None, episodes: Sequence[EpisodeSeeds], *, moments: bool = False
     ) -> Outcomes:
         """The same as without watching."""
         assert isinstance(brains, Brains)

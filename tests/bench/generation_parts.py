@@ -101,7 +101,7 @@ def _seconds_by_part(settings: RunSettings) -> list[dict[str, float]]:
         Runner(settings.task, settings.noise, executor, training=True) as runner,
         clock.timing(Coevolution, "ask", EVOLUTION),
         clock.timing(Coevolution, "tell", EVOLUTION),
-        clock.timing(training, "assemble_all", BRAINS),
+        clock.timing(training, "assemble", BRAINS),
         clock.timing(Runner, "run", EPISODES),
     ):
         evolving = training.Training.start(settings)

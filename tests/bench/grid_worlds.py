@@ -13,7 +13,7 @@ import yaml
 
 from exneat_cli.algorithms import RECURRENT, ArrayGenome, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
@@ -66,7 +66,7 @@ class Contest(NamedTuple):
 
     def run_ours(self, genomes: Sequence[ArrayGenome], seeds: Sequence[EpisodeSeeds]) -> Outcomes:
         """Outcomes of all genomes in the same episodes, as in training; networks and worlds are made here."""
-        brains = assemble_all(self.plan, [[genome] for genome in genomes], feed_forward=False)
+        brains = assemble(self.plan, [[genome] for genome in genomes], feed_forward=False)
         return self.runner.run(brains, seeds)
 
     def run_reference(self, genomes: Sequence[neat.DefaultGenome], episodes: int) -> list[PlainOutcome]:

@@ -53,7 +53,7 @@ def _forward_reward(
     env: gymnasium.Env[Any, Any], genome: neat.DefaultGenome, config: neat.Config, seeds: EpisodeSeeds
 ) -> float:
     network = neat.nn.FeedForwardNetwork.create(genome, config)
-    env.unwrapped.np_random = generator(seeds.world)
+    env.unwrapped.np_random = generator(seeds[0])
     observation, _ = env.reset()
     total, over = 0.0, False
     while not over:

@@ -130,4 +130,4 @@ class NeatTraining:
     def _world_seed(self, generation: int) -> SeedSequence:
         """Of the one episode that all genomes of a generation (from 0) face, the same as ours."""
         (seeds,) = training_episodes(self._settings.seed, generation, 1)
-        return seeds.world
+        return seeds[0]

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from exneat_cli.algorithms import EvolutionSettings, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
-from exneat_cli.brains import assemble_all
+from exneat_cli.brains import assemble
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
@@ -90,7 +90,7 @@ def _check_episodes(theirs: NeatTraining, runner: WatchedRunner) -> None:
     config = neat_config(SETTINGS.evolution, SETTINGS.population, shape)
     population = Subpopulation(config, stream(SETTINGS.seed, "evolution", 0))
     genomes = list(population.genomes.values())[:CHECKED_GENOMES]
-    brains = assemble_all(SETTINGS.plan, [[genome] for genome in genomes], feed_forward=True)
+    brains = assemble(SETTINGS.plan, [[genome] for genome in genomes], feed_forward=True)
     outcomes = runner.run(brains, training_episodes(SETTINGS.seed, 0, 1))
     for genome, fitness, steps in zip(genomes, outcomes.fitness[:, 0], outcomes.steps[:, 0], strict=True):
         expected = evaluate_genome(to_stock(genome), theirs.config)

@@ -48,7 +48,7 @@ class Workload(NamedTuple):
 
     def brains(self) -> list[Brains]:
         """The genomes compiled."""
-        return [assemble(PLAN, [genome], feed_forward=SETTINGS.feed_forward) for genome in self.genomes]
+        return [assemble(PLAN, [[genome]], feed_forward=SETTINGS.feed_forward) for genome in self.genomes]
 
 
 def open_runner(threads: int) -> Runner:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.algorithms import RECURRENT, EvolutionSettings, from_stock, to_stock
-from exneat_cli.brains import Brains, assemble, assemble_all, linear_fusion, motionless
+from exneat_cli.brains import Brains, assemble, linear_fusion, motionless
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import LINKAGES, Geometry, Module, Plan, Wiring, plan_modules
@@ -85,7 +85,7 @@ class SlowTeam:
 
 def assert_equal_to_reference(plan: Plan, genomes: list[neat.DefaultGenome], feed_forward: bool, seed: int) -> None:
     arrays = [from_stock(genome) for genome in genomes]
-    brain = assemble(plan, arrays, feed_forward=feed_forward)
+    brain = assemble(plan, [arrays], feed_forward=feed_forward)
     slow = SlowTeam(plan, [to_stock(genome) for genome in arrays], feed_forward)
     sensed = np.random.default_rng(seed).normal(size=(STEPS, plan.observation_size))
     for action, row in zip(actions_of(brain, 0, sensed), sensed, strict=True):
@@ -133,7 +133,7 @@ def brains_of_many_sizes() -> list[Brains]:
         for seed, (geometry, linkage) in enumerate([("single", "hidden"), ("all", "none"), ("all", "output")]):
             plan = cross_plan(geometry, linkage)
             teams = [[from_stock(g) for g in random_team(plan, GRID, 2 * seed + k)] for k in range(2)]
-            brains.append(assemble_all(plan, teams, feed_forward=feed_forward))
+            brains.append(assemble(plan, teams, feed_forward=feed_forward))
     return brains
 
 

@@ -25,7 +25,7 @@ def assert_equal_outputs(genome: neat.DefaultGenome, settings: EvolutionSettings
     # Sorted genes: neat-python sums in the order of the connections.
     network = kind.create(to_stock(from_stock(genome)), neat_config(settings, 10, SHAPE))
     sensed = np.random.default_rng(seed).normal(size=(STEPS, INPUTS))
-    actions = actions_of(assemble(PLAN, [from_stock(genome)], feed_forward=settings.feed_forward), 0, sensed)
+    actions = actions_of(assemble(PLAN, [[from_stock(genome)]], feed_forward=settings.feed_forward), 0, sensed)
     for action, row in zip(actions, sensed, strict=True):
         np.testing.assert_allclose(action, network.activate(row), rtol=1e-12, atol=0.0)
 
@@ -68,6 +68,6 @@ def test_odd_feed_forward_graphs_equal_neat_pythons(edges: list[tuple[int, int, 
 def test_a_connection_with_an_end_that_does_not_exist_is_refused(target: int, source: int) -> None:
     genome = genome_of([(key, 0.0, 1.0, 0) for key in range(OUTPUTS)], [(target, source, 1, 1.0, True)])
     with pytest.raises(ValueError, match="an end that does not exist"):
-        assemble(PLAN, [genome], feed_forward=True)
+        assemble(PLAN, [[genome]], feed_forward=True)
     with pytest.raises(ValueError, match=r"expected 1 genomes per team, got \[2\]"):
-        assemble(PLAN, [genome, genome], feed_forward=True)
+        assemble(PLAN, [[genome, genome]], feed_forward=True)

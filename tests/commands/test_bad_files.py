@@ -101,7 +101,7 @@ def test_nothing_in_a_file_of_the_users_own_is_called(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     calls = "{_target_: os.mkdir, path: called}"
     logging = "{version: 1, handlers: {x: {'()': os.mkdir, path: called}}}"
     hydras = f"hydra: {{callbacks: {{x: {calls}}}, job_logging: {logging}, run: {{dir: called}}}}\n"
@@ -126,7 +126,7 @@ def test_a_launcher_of_the_users_own_is_taken_unless_it_calls_something_else(
     (launchers / "made.yaml").write_text(target + """verbose: "${oc.create:'{_target_: os.mkdir}'}"\n""")
     (launchers / "logging.yaml").write_text(target + "x: {'()': os.mkdir}\n")
     train = ["train", "-m", "--config-dir", "mine", "task=track_maze", "algorithm=motionless", "budget=smoke"]
-    monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     for name in ("nested", "made", "logging"):
         check_refusal([*train, f"hydra/launcher={name}"], ["a configuration may not call code"], tmp_path, capfd)
     check_refusal([*train, "hydra/launcher=strange"], ["Invalid plugin 'os.mkdir'"], tmp_path, capfd)
@@ -149,7 +149,7 @@ def test_files_with_other_line_ends_and_letters_in_places_with_spaces_or_links_a
     (tmp_path / "real").mkdir()
     (tmp_path / "out puts").symlink_to(tmp_path / "real")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     task = TASK + "# größe, 大きさ\nname: my_mazes\nseed: 3\ntest_episodes: 3\n".encode()
     (tmp_path / "my own files" / "task" / "mine.yaml").write_bytes(task.replace(b"\n", b"\r\n"))
     own = ["--config-dir", "my own files", "budget=smoke", "output=out puts"]

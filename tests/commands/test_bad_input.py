@@ -270,7 +270,7 @@ def test_a_value_means_the_same_in_every_command_whatever_its_characters(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    monkeypatch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     assert main(["train", "task=track_maze", "algorithm=motionless", "budget=smoke", f"output={output}"]) == 0
     (run,) = (tmp_path / place / "track_maze").iterdir()
     assert main(["inspect", f"output={output}"]) == 0

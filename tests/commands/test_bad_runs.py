@@ -20,7 +20,7 @@ TRAIN = ["train", "task=track_maze", "budget=smoke", "generations=1", "populatio
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("sound")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
         assert main([*TRAIN, f"output={output}"]) == 0
     (run,) = (output / "track_maze").iterdir()
     return run

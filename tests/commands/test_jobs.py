@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from exneat_cli.commands.jobs import draw_what_is_missing, missing_figures
+from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
+from exneat_cli.rollouts import Sweep
+from exneat_cli.runs import RunSettings
 
+JOB = Job("swept", RunSettings(), (Sweep("reset_noise", "noise.reset_scale", (0.1,), "reset noise"),), episodes=1)
 NAMES = ["training", "path", "network", "robustness"]
 
 
@@ -29,27 +32,27 @@ def drawn(tmp_path: Path) -> RunDirectory:
 
 
 def test_what_is_drawn_already_is_not_missing(drawn: RunDirectory) -> None:
-    assert missing_figures(drawn, swept=True) == []
+    assert JOB.missing_figures(drawn) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_figure_that_is_not_there_is_missing(drawn: RunDirectory, name: str) -> None:
     (drawn.plots / f"{name}.svg").unlink()
-    assert missing_figures(drawn, swept=True) == [name]
+    assert JOB.missing_figures(drawn) == [name]
 
 
 def test_a_figure_of_robustness_that_is_older_than_its_data_is_missing(drawn: RunDirectory) -> None:
     os.utime(drawn.plots / "robustness.svg", (999, 999))
-    assert missing_figures(drawn, swept=True) == ["robustness"]
+    assert JOB.missing_figures(drawn) == ["robustness"]
 
 
 def test_a_figure_without_data_is_not_missing(tmp_path: Path) -> None:
-    assert missing_figures(RunDirectory(tmp_path), swept=True) == []
+    assert JOB.missing_figures(RunDirectory(tmp_path)) == []
 
 
 def test_nothing_is_drawn_while_another_process_may_change_the_data(drawn: RunDirectory) -> None:
     picture = drawn.plots / "training.svg"
     picture.unlink()
     with drawn.held(), pytest.raises(ExneatError, match="another process is writing there"):
-        draw_what_is_missing(drawn, "fitness", {})
+        JOB.draw(drawn)
     assert not picture.exists()

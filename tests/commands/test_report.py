@@ -10,7 +10,7 @@ import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
 from exneat_cli.commands.command_line import shipped_directory
-from exneat_cli.commands.experiments import experiment_names, read_experiment
+from exneat_cli.commands.sweep import experiment_names, read_experiment
 from exneat_cli.main import main
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
@@ -27,7 +27,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All five experiments at smoke size."""
     output = tmp_path_factory.mktemp("smoke") / "outputs"
     with pytest.MonkeyPatch.context() as patch:  # the figures of single runs are not looked at here, and slow
-        patch.setattr("exneat_cli.commands.jobs.draw_what_is_missing", lambda *arguments, **options: None)
+        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
         for name in experiment_names():
             assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
     return output

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from exneat_cli.commands.command_line import read_command_line
-from exneat_cli.commands.experiments import experiment_names, plan_jobs, read_experiment
 from exneat_cli.commands.jobs import Job
+from exneat_cli.commands.sweep import experiment_names, plan_jobs, read_experiment
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, read_robustness

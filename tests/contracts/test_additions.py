@@ -23,7 +23,6 @@ from exneat_cli.algorithms import (
     Search,
     State,
     Team,
-    Trials,
     pack_teams,
     unpack_teams,
 )
@@ -32,7 +31,7 @@ from exneat_cli.errors import check_real, check_whole
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory
 from exneat_cli.tasks import ENDED, RUNNING, TASKS, Part, Simulation, Task
-from exneat_cli.wiring import LINKAGES, Pin, Sizes
+from exneat_cli.wiring import LINKAGES, Pin
 
 
 class CorridorWorld(NamedTuple):
@@ -110,9 +109,10 @@ class RandomSearch(Algorithm):
 
     def restored(self, problem: Problem, state: State) -> Search:
         search = Draws(problem, self.kept)
-        search.generation = int(state.plain["generation"])
-        (search.best,) = unpack_teams(state.arrays, "best", problem)
-        search.fitness = float(state.plain["fitness"])
+        plain, columns = state
+        search.generation = int(plain["generation"])
+        (search.best,) = unpack_teams(columns, "best", problem)
+        search.fitness = float(plain["fitness"])
         return search
 
 
@@ -124,11 +124,11 @@ class Draws(Search):
         self.teams: list[Team] = []
         self.second = False
 
-    def ask(self) -> Trials:
+    def ask(self) -> tuple[list[Team], int]:
         if not self.second:
             anew = replace(self.problem, seed=self.problem.seed + 1 + self.generation)
-            self.teams = list(ExNEAT().start(anew).ask().teams)
-        return Trials(self.teams, self.problem.episodes)
+            self.teams = list(ExNEAT().start(anew).ask()[0])
+        return self.teams, self.problem.episodes
 
     def tell(self, results: Results) -> bool:
         fitness = np.where(results.failed, -np.inf, results.fitness.mean(axis=1))
@@ -146,13 +146,13 @@ class Draws(Search):
     def state(self) -> State:
         assert self.best is not None
         plain = {"generation": self.generation, "fitness": self.fitness}
-        return State(plain, pack_teams([self.best], "best"))
+        return plain, pack_teams([self.best], "best")
 
     def columns(self) -> dict[str, int | float]:
         return {"record": self.fitness}
 
 
-def opposite(parts: Sequence[Part], own: int, sizes: Sizes) -> tuple[Pin, ...]:
+def opposite(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The first output of the last other part."""
     peers = [k for k in range(len(parts)) if k != own]
     return (Pin(0, peers[-1], delayed=True),)

@@ -8,7 +8,7 @@ import pytest
 
 from exneat_cli.errors import ConfigError
 from exneat_cli.tasks import TASKS, Part, Task
-from exneat_cli.wiring import LINKAGES, Geometry, Pin, Sizes, Wiring, plan_modules
+from exneat_cli.wiring import LINKAGES, Geometry, Pin, Wiring, plan_modules
 
 
 @pytest.fixture(params=sorted(LINKAGES))
@@ -20,7 +20,7 @@ def linkage(request: pytest.FixtureRequest) -> str:
 def reads(linkage: str, body: Task, *, hidden: int) -> tuple[bool, bool]:
     """Whether it reads a central module, and hidden nodes of part modules."""
     parts, outputs = body.parts, 2
-    links = [LINKAGES[linkage](parts, own, Sizes((outputs,) * len(parts), hidden)) for own in range(len(parts))]
+    links = [LINKAGES[linkage](parts, own, (outputs,) * len(parts), hidden) for own in range(len(parts))]
     pins = [pin for own in links for pin in own]
     of_parts = [pin for pin in pins if pin.module < len(parts)]
     return len(of_parts) < len(pins), any(pin.index >= outputs for pin in of_parts)
@@ -70,8 +70,7 @@ def seen_from(parts: list[Part], own: int, pin: Pin) -> tuple[int, int, int]:
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 def test_links_are_distinct_and_come_in_the_same_relative_order_at_each_part(linkage: str, count: int) -> None:
     parts = polygon(count, actuators=2)
-    sizes = Sizes((2,) * count, hidden=3)
-    links = [LINKAGES[linkage](parts, own, sizes) for own in range(count)]
+    links = [LINKAGES[linkage](parts, own, (2,) * count, 3) for own in range(count)]
     seen = [[seen_from(parts, own, pin) for pin in links[own]] for own in range(count)]
     assert all(view == seen[0] for view in seen)
     assert len(set(seen[0])) == len(seen[0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.algorithms import Problem
-from exneat_cli.brains import Brains, RandomActions, assemble, linear_fusion, motionless
+from exneat_cli.brains import Brains, assemble, linear_fusion, motionless
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
@@ -37,14 +37,13 @@ def live(task: Task, simulation: Simulation) -> list[list[float]]:
         place = np.full(len(task.trace_columns), np.nan)
         simulation.observe(simulation.world, observation)
         status = simulation.step(simulation.world, rng.uniform(*task.action_bounds), terms)
-        simulation.locate(simulation.world, place)
+        if simulation.locate is not None:
+            simulation.locate(simulation.world, place)
         seen.append([*observation, *terms, *place, float(status)])
     return seen
 
 
-def run(
-    task: Task, acting: list[Brains] | RandomActions, episodes: list[EpisodeSeeds], std: float, training: bool
-) -> Outcomes:
+def run(task: Task, acting: list[Brains] | None, episodes: list[EpisodeSeeds], std: float, training: bool) -> Outcomes:
     with Runner(task, Noise(std), Executor("serial"), training=training) as runner:
         return runner.run(acting, episodes)
 
@@ -58,8 +57,8 @@ def quite_different_brains(task: Task) -> list[Brains]:
     """Random networks, one that follows all it senses, one that fails at once, and one that does nothing."""
     settings = RunSettings(task=task, algorithm="neat", population=4)  # type: ignore[arg-type]
     problem = Problem(settings.plan, settings.evolution, 4, 1, "rank", seed=4)
-    teams = settings.algorithm.start(problem).ask().teams
-    networks = [assemble(settings.plan, t.genomes, feed_forward=settings.evolution.feed_forward) for t in teams]
+    teams = settings.algorithm.start(problem).ask()[0]
+    networks = [assemble(settings.plan, [t.genomes], feed_forward=settings.evolution.feed_forward) for t in teams]
     sizes = task.sensed_size, len(task.actuator_names)
     failing = motionless(sizes[0], np.full(sizes[1], np.nan))
     return [linear_fusion(*sizes, task.parts), failing, *networks, motionless(sizes[0], task.resting_action)]
@@ -140,18 +139,18 @@ def test_a_trace_never_depends_on_what_the_runner_did_before(task: Task) -> None
     with Runner(task, Noise(0.3), Executor("serial"), training=True) as used:
         for brain in brains:
             used.run(brains, [other])
-            trace = used.trace(brain, seeds)
+            steps, tiles = used.trace(brain, seeds)
             with Runner(task, Noise(0.3), Executor("serial"), training=True) as fresh:
-                expected = fresh.trace(brain, seeds)
-            np.testing.assert_array_equal(trace.steps, expected.steps)
-            np.testing.assert_array_equal(trace.tiles, expected.tiles)
-            assert trace.steps.shape[1] == len(task.trace_columns) + len(task.terms)
-            assert (trace.tiles is not None) == isinstance(task, HasTiles)
+                expected_steps, expected_tiles = fresh.trace(brain, seeds)
+            np.testing.assert_array_equal(steps, expected_steps)
+            np.testing.assert_array_equal(tiles, expected_tiles)
+            assert steps.shape[1] == len(task.trace_columns) + len(task.terms)
+            assert (tiles is not None) == isinstance(task, HasTiles)
 
 
 def test_random_episodes_report_sensible_figures(task: Task) -> None:
-    episodes = [e._replace(actions=stream(9, "random_actions", k)) for k, e in enumerate(training_episodes(3, 0, 20))]
-    outcomes = run(task, RandomActions(*task.action_bounds), episodes, std=0.1, training=False)
+    episodes = [(*seeds[:2], stream(9, "random_actions", k)) for k, seeds in enumerate(training_episodes(3, 0, 20))]
+    outcomes = run(task, None, episodes, std=0.1, training=False)
     assert outcomes.fitness.shape == (1, 20)
     assert not outcomes.failed.any()
     assert np.isfinite(outcomes.fitness).all()

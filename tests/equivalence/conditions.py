@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, Problem, Results
-from exneat_cli.brains import Brains, assemble_all
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.brains.brain import activate, memory_size
 from exneat_cli.commands.command_line import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Runner
@@ -40,7 +40,7 @@ def xor(genome: str, seed: int) -> float:
     evolution = Coevolution(Problem(XOR_PLAN, settings, XOR_POPULATION, episodes=1, pairing="rank", seed=seed))
     best = -np.inf
     for _ in range(XOR_GENERATIONS):
-        brains = assemble_all(XOR_PLAN, [team.genomes for team in evolution.ask().teams], feed_forward=True)
+        brains = assemble(XOR_PLAN, [team.genomes for team in evolution.ask()[0]], feed_forward=True)
         fitness = np.array([[_xor_fitness(brains, b)] for b in range(XOR_POPULATION)])
         evolution.tell(Results(fitness, np.zeros(XOR_POPULATION, np.bool_)))
         best = max(best, float(fitness.max()))

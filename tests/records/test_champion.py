@@ -31,7 +31,7 @@ TEST = Score(3, 1.0, 0.5, 2.0, 0.5, 0, (0.5, 1.0, 1.5))
 def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A champion with links and a central module, as data."""
     run = RunSettings(task=AntTask(), geometry=Geometry("lr"), linkage="full", population=4)
-    team = Training.start(run).search.ask().teams[0]
+    team = Training.start(run).search.ask()[0][0]
     champion = Champion(
         variant=run.variant,
         task={"name": "ant"},

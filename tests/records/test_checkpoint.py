@@ -23,7 +23,7 @@ PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}
 
 
 def written(directory: Path, generation: int = 3, configuration_hash: str = "hash") -> Path:
-    write_checkpoint(directory, State({"generation": generation, **PLAIN}, ARRAYS), configuration_hash)
+    write_checkpoint(directory, ({"generation": generation, **PLAIN}, ARRAYS), configuration_hash)
     return directory / f"checkpoint-{generation:06d}.npz"
 
 
@@ -34,9 +34,10 @@ def read(directory: Path) -> list[State | str]:
 def is_whole(found: State | str, generation: int = 3) -> bool:
     if isinstance(found, str):
         return False
-    assert found.plain == {"generation": generation, **PLAIN}
-    assert found.arrays.keys() == ARRAYS.keys()
-    return all(np.array_equal(found.arrays[name], column) for name, column in ARRAYS.items())
+    plain, arrays = found
+    assert plain == {"generation": generation, **PLAIN}
+    assert arrays.keys() == ARRAYS.keys()
+    return all(np.array_equal(arrays[name], column) for name, column in ARRAYS.items())
 
 
 def test_what_was_written_is_read_the_newest_first_and_only_two_are_kept(tmp_path: Path) -> None:
@@ -56,7 +57,7 @@ def test_it_is_a_plain_npz_that_needs_no_pickle(tmp_path: Path) -> None:
 
 def test_a_number_that_is_not_finite_is_never_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError):
-        write_checkpoint(tmp_path, State({"generation": 1, "fitness": [float("nan")]}, {}), "hash")
+        write_checkpoint(tmp_path, ({"generation": 1, "fitness": [float("nan")]}, {}), "hash")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -124,4 +125,4 @@ def test_a_damaged_checkpoint_of_a_later_generation_never_crowds_out_a_sound_one
     for generation in (1, 2, 3):
         written(tmp_path, generation)
         assert is_whole(read(tmp_path)[0], generation)
-    assert [found.plain["generation"] for found in read(tmp_path) if isinstance(found, State)] == [3, 2]
+    assert [found[0]["generation"] for found in read(tmp_path) if not isinstance(found, str)] == [3, 2]

@@ -16,11 +16,12 @@ from typing import Any
 import distributed
 import psutil
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from exneat_cli.brains import RandomActions
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Executor, cluster, keep_clusters, settings
-from exneat_cli.rollouts.cluster import cluster_of, run_block, versions
+from exneat_cli.rollouts.cluster import blocks, cluster_of, run_block, versions
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import AntTask, GeneralMaze, Task
 from exneat_cli.wiring import Geometry
@@ -48,7 +49,7 @@ def _one_cluster_for_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
 @pytest.mark.parametrize("task", [ANT, GeneralMaze(), PLAIN], ids=lambda task: task.name)
 def test_outcomes_and_moments_are_those_of_one_thread(task: Task, workers: int) -> None:
     where = Executor("dask", workers)
-    for brains in (random_brains(13, task), random_brains(1, task), RandomActions(*task.action_bounds)):
+    for brains in (random_brains(13, task), random_brains(1, task), None):
         assert_equal(run(task, brains, where), run(task, brains, SERIAL))
 
 
@@ -109,6 +110,16 @@ def test_the_work_of_killed_workers_is_done_again() -> None:
     assert_equal(run(ANT, brains, TWO), expected)
     killer.join()
     assert len(killed) >= 2
+
+
+@given(st.integers(1, 60), st.integers(0, 30), st.integers(1, 20), st.integers(1, 10**9))
+def test_processes_get_every_brain_once_in_each_episode(b: int, e: int, workers: int, smallest: int) -> None:
+    given_out = blocks(b, e, workers, smallest)
+    runs = [(k, n) for some, which in given_out for k in range(some.start, some.stop) for n in range(e)[which]]
+    assert sorted(runs) == [(k, n) for k in range(b) for n in range(e)]
+    assert len(given_out) >= min(workers, b * e)
+    if smallest >= b * e:  # not worth being cut
+        assert len(given_out) <= 2 * workers
 
 
 def test_workers_with_other_versions_are_refused() -> None:

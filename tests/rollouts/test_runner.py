@@ -1,4 +1,4 @@
-"""Episodes: independent of workers, disturbed as told, counted right, and safe from explosions."""
+"""Episodes: shared out in full, independent of workers, disturbed as told, counted right, and safe from explosions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from exneat_cli.brains import Brains, RandomActions, motionless
+from exneat_cli.brains import Brains, motionless
 from exneat_cli.brains.rules import weighted_sums
-from exneat_cli.rollouts import Executor, Noise, Runner
+from exneat_cli.rollouts import Executor, Noise, Runner, runner
+from exneat_cli.rollouts.runner import shares_for_threads, short_shares
 from exneat_cli.seeding import generator, training_episodes
 from exneat_cli.tasks import TrackMaze
 from tests.rollouts.drifting import COMPILED, EPISODES, PLAIN, SERIAL, Drifting, assert_equal, random_brains, run
@@ -39,7 +42,7 @@ def test_a_step_observes_disturbs_clips_senses_thinks_drives_and_steps_in_this_o
         fitness = runner.run(brains, EPISODES).fitness
         for b, k in np.ndindex(fitness.shape):
             expected, _ = by_hand(brains[b], k)
-            np.testing.assert_allclose(runner.trace(brains[b], EPISODES[k]).steps, expected, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(runner.trace(brains[b], EPISODES[k])[0], expected, rtol=0, atol=1e-12)
             assert fitness[b, k] == pytest.approx(expected[:, 1].sum(), abs=1e-12)
 
 
@@ -82,12 +85,12 @@ def test_an_exploding_episode_gets_the_failure_floor_and_leaves_the_others_alone
     np.testing.assert_array_equal([mixed.fitness[::2], mixed.full_reward[::2]], -7.0)
 
 
-@pytest.mark.parametrize("acting", [motionless(2, np.zeros(1)), motionless(3, np.zeros(2)), RandomActions(*np.eye(2))])
-def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(acting: Any) -> None:
+@pytest.mark.parametrize("acting", [motionless(2, np.zeros(1)), motionless(3, np.zeros(2))])
+def test_a_brain_of_another_task_is_refused_before_it_can_touch_memory(acting: Brains) -> None:
     message = r"brains: expected sizes \(3, 1\) of observation and action, got \((2, 1|3, 2)\)"
     with Runner(Drifting(), Noise(), SERIAL, training=False) as runner:
         with pytest.raises(ValueError, match=message):
-            runner.run([acting] if isinstance(acting, Brains) else acting, EPISODES)
+            runner.run([acting], EPISODES)
         with pytest.raises(ValueError, match=message):
             runner.trace(acting, EPISODES[0])
 
@@ -126,3 +129,31 @@ def test_an_error_in_one_thread_stops_the_others_reaches_the_caller_and_leaves_t
             runner.run(brains, episodes)
         assert 3 <= len(begun) < 20
         assert_equal(runner.run(brains, episodes, moments=True), expected)
+
+
+@given(st.integers(1, 300), st.integers(0, 40), st.integers(1, 20))
+@settings(deadline=None)
+def test_threads_get_every_brain_once_in_each_episode_in_their_order(brains: int, episodes: int, threads: int) -> None:
+    every = [(episode, brain) for episode in range(episodes) for brain in range(brains)]
+    for shares in (shares_for_threads(brains, episodes, threads), short_shares(brains, episodes)):
+        assert [(episode, b) for episode, first, last in shares for b in range(first, last)] == every
+
+
+def test_one_thread_draws_each_world_once_and_many_end_with_single_brains() -> None:
+    one, eight = ([last - first for _, first, last in shares_for_threads(50, 4, threads)] for threads in (1, 8))
+    assert one == [50] * 4
+    assert eight[0] > 1
+    assert eight[-8:] == [1] * 8
+
+
+@pytest.mark.parametrize(("seconds_per_brain", "largest"), [(1.0, 1), (1e-5, 200), (0.02, 4)])
+def test_calls_in_the_main_thread_are_as_long_as_signals_may_wait(
+    seconds_per_brain: float, largest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(runner.time, "perf_counter", lambda: now[0])
+    sizes = []
+    for _, first, last in short_shares(200, 3):
+        sizes.append(last - first)
+        now[0] += seconds_per_brain * sizes[-1]
+    assert max(sizes) == largest

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from exneat_cli.algorithms import ACTIVATIONS
-from exneat_cli.brains import Brains, assemble_all
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory, read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
@@ -208,7 +208,7 @@ def exploding(brains: Brains, every: int = 1) -> Brains:
 
 
 def test_exploding_teams_are_counted_and_never_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o), every=2))
+    monkeypatch.setattr(training_module, "assemble", lambda *a, **o: exploding(assemble(*a, **o), every=2))
     settings = tiny(tmp_path, population=10, generations=4)
     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
         training = training_module.Training.start(settings)
@@ -230,7 +230,7 @@ def test_two_trainings_in_one_process_do_not_disturb_each_other(tmp_path: Path) 
 def test_a_run_in_which_every_team_explodes_fails_with_a_clear_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(training_module, "assemble_all", lambda *a, **o: exploding(assemble_all(*a, **o)))
+    monkeypatch.setattr(training_module, "assemble", lambda *a, **o: exploding(assemble(*a, **o)))
     with pytest.raises(ExneatError, match="no team ever finished"):
         train(tiny(tmp_path))
     manifest = tiny(tmp_path).directory.read_manifest()

@@ -78,9 +78,9 @@ def _original(settings: RunSettings, folder: Path) -> _Original:
     other = train(replace(settings, seed=2, output=str(folder / "other"))).directory
     before, newest = sorted(run.path.glob("checkpoint-*.npz"))
     restored = {
-        each.plain["generation"]: each
+        each[0]["generation"]: each
         for each in read_checkpoints(run.path, settings.full_hash)
-        if isinstance(each, State)
+        if not isinstance(each, str)
     }
     other_data = (other.path / newest.name).read_bytes()
     return _Original(settings, newest, newest.read_bytes(), before.read_bytes(), other_data, restored)
@@ -125,10 +125,11 @@ def _restore(original: _Original, data: bytes) -> str:
 
 def _same(one: State, other: State) -> bool:
     """Whether two checkpoints hold the same; NaN equals nothing, not even itself."""
-    if one.arrays.keys() != other.arrays.keys():
+    (plain, arrays), (others_plain, others) = one, other
+    if arrays.keys() != others.keys():
         return False
-    same = [np.array_equal(one.arrays[name], other.arrays[name]) for name in one.arrays]
-    return all(same) and _plain(one.plain) == _plain(other.plain)
+    same = [np.array_equal(arrays[name], others[name]) for name in arrays]
+    return all(same) and _plain(plain) == _plain(others_plain)
 
 
 def _plain(value: Any) -> Any:

@@ -18,7 +18,7 @@ from unittest import mock
 import numpy as np
 
 from exneat_cli.algorithms import ACTIVATIONS
-from exneat_cli.brains import Brains, assemble_all
+from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Noise, Sweep
@@ -75,12 +75,12 @@ def _with_networks(name: str, settings: RunSettings, mistakes: Mistakes) -> int:
         chance, ordered = random.Random(settings.seed), [0]
 
         def spoilt(*arguments: Any, chance: random.Random = chance, ordered: list[int] = ordered, **options: Any):
-            brains = assemble_all(*arguments, **options)
+            brains = assemble(*arguments, **options)
             chosen = sorted(chance.sample(range(len(brains.size)), 4))
             ordered[0] += len(chosen)
             return _poisoned(brains, chosen, chance)
 
-        with mock.patch.object(training, "assemble_all", spoilt), _empty_directory() as folder:
+        with mock.patch.object(training, "assemble", spoilt), _empty_directory() as folder:
             run = train(replace(settings, output=str(folder / "out"), executor=Executor(workers=workers))).directory
             _look_at(f"{name}, networks", run, folder, ordered[0] * settings.episodes, mistakes)
             came = results(folder / "out")

@@ -1,7 +1,10 @@
-"""What a genome consists of: two tables, one row per gene; and compiled questions to them and to their graph.
+"""What a genome consists of: two tables, one row per gene; compiled questions to their graph, and compiled operators.
 
 Rows are sorted, nodes by `key` and connections by (`target`, `source`): two genomes are compared and crossed
 in one pass, and a network finds the connections into a node side by side.
+
+Source of crossover, distance and mutation: Stanley and Miikkulainen, "Evolving neural networks through augmenting
+topologies" (2002), sections 3.1 to 3.3, in neat-python's form, which is said at each.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
@@ -38,6 +42,14 @@ Connections = NDArray[np.void]
 Genes = tuple[Nodes, Connections]
 """All genes of one genome."""
 
+Number = tuple[float, float, float, float, float, float, float]
+"""How one attribute that is a number begins and changes: mean, sd, shift_rate, replace_rate, power, low and high. Drawn
+anew, with the chance replace_rate, it is N(mean, sd); a shift, with the chance shift_rate, adds N(0, power); it never
+leaves [low, high]."""
+
+STAYS_DISABLED = 0.75
+"""Chance that a gene is disabled which is disabled in a parent (the 2002 paper, section 4.1)."""
+
 
 def end_to_end(tables: Iterable[NDArray[np.void]], kind: np.dtype[np.void]) -> NDArray[np.void]:
     """All rows of all tables, which are of this kind; bytes are copied, where NumPy would go field by field."""
@@ -50,8 +62,7 @@ def row_of(connections: Connections, target: int, source: int) -> int:
     low, high = 0, connections.size
     while low < high:
         middle = (low + high) // 2
-        gene = connections[middle]
-        if gene.target < target or (gene.target == target and gene.source < source):
+        if (connections[middle].target, connections[middle].source) < (target, source):
             low = middle + 1
         else:
             high = middle
@@ -73,14 +84,7 @@ def node_row(nodes: Nodes, key: int) -> int:
 
 @compiled
 def mark_sources(nodes: Nodes, connections: Connections, marked: NDArray[np.bool_], only_enabled: bool) -> None:
-    """Mark, beside the nodes in `marked`, every node that leads to one of them.
-
-    Args:
-        nodes: (N,).
-        connections: (C,).
-        marked: (N,), changed.
-        only_enabled: follow no disabled connections.
-    """
+    """Mark, beside the nodes in `marked`, (N,), every node that leads to one of them; maybe by enabled genes alone."""
     stack = np.empty(nodes.size, np.int64)  # rows that are marked, but whose sources are not yet
     depth = 0
     for row in range(nodes.size):
@@ -110,3 +114,142 @@ def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, sou
     marked[node_row(nodes, source)] = True
     mark_sources(nodes, connections, marked, False)
     return bool(marked[node_row(nodes, target)])
+
+
+@compiled
+def cross(fitter: Genes, other: Genes, rng: Generator) -> Genes:
+    """The genes of a child.
+
+    Matching genes mix attribute by attribute. All others come from the fitter parent, so that a child's graph is that
+    parent's and cannot have a cycle which that has not.
+    """
+    return _cross_nodes(fitter[0], other[0], rng), _cross_connections(fitter[1], other[1], rng)
+
+
+@compiled
+def _cross_nodes(fitter, other, rng):  # type: ignore[no-untyped-def]
+    child = fitter.copy()
+    j = 0
+    for i in range(child.size):
+        # Both tables are sorted: one pass finds what matches.
+        while j < other.size and other[j].key < child[i].key:
+            j += 1
+        if j < other.size and other[j].key == child[i].key:
+            if rng.random() < 0.5:
+                child[i].bias = other[j].bias
+            if rng.random() < 0.5:
+                child[i].response = other[j].response
+            if rng.random() < 0.5:
+                child[i].activation = other[j].activation
+    return child
+
+
+@compiled
+def _cross_connections(fitter, other, rng):  # type: ignore[no-untyped-def]
+    child = fitter.copy()
+    j = 0
+    for i in range(child.size):
+        gene = child[i]
+        while j < other.size and (other[j].target, other[j].source) < (gene.target, gene.source):
+            j += 1
+        # An innovation number belongs to one pair of nodes, so genes that match by it meet here.
+        if j < other.size and other[j].innovation == gene.innovation:
+            either_disabled = not (gene.enabled and other[j].enabled)
+            if rng.random() < 0.5:
+                gene.weight = other[j].weight
+            if rng.random() < 0.5:
+                gene.enabled = other[j].enabled
+            if either_disabled and rng.random() < STAYS_DISABLED:
+                gene.enabled = False
+    return child
+
+
+@compiled
+def genetic_distance(one: Genes, other: Genes, disjoint_coefficient: float, weight_coefficient: float) -> float:
+    """Distance of two genomes, at least 0; symmetric but for rounding.
+
+    Equation 1 of the paper, but excess and disjoint genes count alike, differences are not averaged over matching
+    genes alone, nodes count as well as connections, and connections match by the nodes that they join.
+    """
+    distance = 0.0
+    most_nodes, most_connections = max(one[0].size, other[0].size), max(one[1].size, other[1].size)
+    if most_nodes > 0:
+        difference, unmatched = _compare_nodes(one[0], other[0])
+        distance += (weight_coefficient * difference + disjoint_coefficient * unmatched) / most_nodes
+    if most_connections > 0:
+        difference, unmatched = _compare_connections(one[1], other[1])
+        distance += (weight_coefficient * difference + disjoint_coefficient * unmatched) / most_connections
+    return distance
+
+
+@compiled
+def _compare_nodes(one, other):  # type: ignore[no-untyped-def]
+    """Sum of the differences of matching genes, and the number of the others."""
+    difference, matched = 0.0, 0
+    i = j = 0
+    while i < one.size and j < other.size:
+        a, b = one[i], other[j]
+        if a.key == b.key:
+            difference += abs(a.bias - b.bias) + abs(a.response - b.response)
+            difference += 1.0 if a.activation != b.activation else 0.0
+            matched += 1
+        i, j = i + (a.key <= b.key), j + (b.key <= a.key)
+    return difference, one.size + other.size - 2 * matched
+
+
+@compiled
+def _compare_connections(one, other):  # type: ignore[no-untyped-def]
+    """The same of connections, which match by the nodes that they join."""
+    difference, matched = 0.0, 0
+    i = j = 0
+    while i < one.size and j < other.size:
+        a, b = (one[i].target, one[i].source), (other[j].target, other[j].source)
+        if a == b:
+            difference += abs(one[i].weight - other[j].weight)
+            difference += 1.0 if one[i].enabled != other[j].enabled else 0.0
+            matched += 1
+        i, j = i + (a <= b), j + (b <= a)
+    return difference, one.size + other.size - 2 * matched
+
+
+@compiled
+def draw(number: Number, rng: Generator) -> float:
+    """A new value."""
+    mean, sd, _, _, _, low, high = number
+    return max(min(mean + sd * rng.standard_normal(), high), low)
+
+
+@compiled
+def mutate_attributes(
+    genes: Genes, numbers: tuple[Number, Number, Number], disable_rate: float, enable_rate: float, rng: Generator
+) -> None:
+    """Change weights, enabled flags, biases and responses in place: each is shifted, drawn anew or left.
+
+    Args:
+        genes: of one genome.
+        numbers: how weights, biases and responses change.
+        disable_rate: chance that an enabled connection's flag is drawn anew, either way with equal chance.
+        enable_rate: the same of a disabled connection.
+        rng: of all draws.
+    """
+    (nodes, connections), (weight, bias, response) = genes, numbers
+    for i in range(connections.size):
+        connections[i].weight = _mutated(connections[i].weight, weight, rng)
+        if rng.random() < (disable_rate if connections[i].enabled else enable_rate):
+            connections[i].enabled = rng.random() < 0.5
+    for i in range(nodes.size):
+        nodes[i].bias = _mutated(nodes[i].bias, bias, rng)
+        nodes[i].response = _mutated(nodes[i].response, response, rng)
+
+
+@compiled
+def _mutated(value, number, rng):  # type: ignore[no-untyped-def]
+    _, _, shift_rate, replace_rate, power, low, high = number
+    if shift_rate + replace_rate <= 0.0:
+        return value
+    chance = rng.random()
+    if chance < shift_rate:
+        return max(min(value + power * rng.standard_normal(), high), low)
+    if chance < shift_rate + replace_rate:
+        return draw(number, rng)
+    return value

@@ -20,11 +20,15 @@ from exneat_cli.algorithms.neat.genes import (
     NODE,
     Connections,
     Genes,
+    Number,
+    cross,
+    draw,
     end_to_end,
+    genetic_distance,
+    mutate_attributes,
     row_of,
     would_close_a_cycle,
 )
-from exneat_cli.algorithms.neat.operators import Number, cross, draw, genetic_distance, mutate_attributes
 
 _ITEMS = ("init_mean", "init_stdev", "mutate_rate", "replace_rate", "mutate_power", "min_value", "max_value")
 _NUMBERS = {name: attrgetter(*(f"{name}_{item}" for item in _ITEMS)) for name in ("weight", "bias", "response")}
@@ -32,16 +36,15 @@ _NUMBERS = {name: attrgetter(*(f"{name}_{item}" for item in _ITEMS)) for name in
 
 def number(config: DefaultGenomeConfig, name: str) -> Number:
     """How the attribute ``weight``, ``bias`` or ``response`` begins and changes."""
-    return Number(*_NUMBERS[name](config))
+    values: Number = _NUMBERS[name](config)
+    return values
 
 
 class ArrayGenome:
     """A genome that neat-python's reproduction and species take in place of `neat.DefaultGenome`.
 
-    Args:
-        key: its id.
-
     Attributes:
+        key: its id.
         fitness: None until it is known.
         nodes: (N,) of kind `NODE`, sorted; never changed in place once the genome is made.
         connections: (C,) of kind `CONNECTION`, likewise.
@@ -141,8 +144,7 @@ class ArrayGenome:
     def distance(self, other: ArrayGenome, config: DefaultGenomeConfig) -> float:
         """Genetic distance to `other`."""
         disjoint, weight = config.compatibility_disjoint_coefficient, config.compatibility_weight_coefficient
-        distance: float = genetic_distance(self.genes, other.genes, disjoint, weight)
-        return distance
+        return float(genetic_distance(self.genes, other.genes, disjoint, weight))
 
     def size(self) -> tuple[int, int]:
         """Numbers of nodes and of enabled connections."""
@@ -160,7 +162,8 @@ def _without(table: NDArray[np.void], row: int) -> NDArray[np.void]:
 
 
 def _initial(number: Number, size: int, rng: Generator) -> NDArray[np.float64]:
-    return np.clip(number.mean + number.sd * rng.standard_normal(size), number.low, number.high)
+    mean, sd, _, _, _, low, high = number
+    return np.clip(mean + sd * rng.standard_normal(size), low, high)
 
 
 def _initial_connections(config: DefaultGenomeConfig) -> Connections:

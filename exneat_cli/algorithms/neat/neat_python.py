@@ -1,10 +1,10 @@
-"""Everything that reaches into neat-python 2.0.0, in one place.
+"""What reaches into neat-python 2.0.0, but for the species that `Subpopulation` restores.
 
 Its species, stagnation and reproduction stay in charge. What is reached into, and why:
 
 * its random numbers come from Python's global generator, which any thread may draw from: `drawing_from`;
 * its reproduction aborts when species are many, and gives every genome hidden nodes of its own: `SteadyReproduction`;
-* its counters cannot be read, and its species cannot be restored: `counter`, `state_of` and `restore`;
+* its counters cannot be read: `counter` and `peek`;
 * its configuration is read from an INI file alone: `neat_config`.
 """
 
@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import copy
 import itertools
-import math
 import random
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,7 +24,7 @@ import neat.genes
 import neat.genome
 import neat.reproduction
 from neat.reporting import ReporterSet
-from neat.species import DefaultSpeciesSet, Species
+from neat.species import DefaultSpeciesSet
 
 from exneat_cli.algorithms.neat.genome import ArrayGenome
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
@@ -137,13 +136,8 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
 def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, int, int]) -> neat.Config:
     """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
 
-    Its `genome_config` has two attributes more: `positive_start`, and `generator`, which must be set before array
-    genomes are made, since they draw from it.
-
-    Args:
-        settings: see there.
-        population: genomes per generation.
-        shape: numbers of inputs, initial hidden nodes and outputs.
+    `shape` is inputs, initial hidden nodes and outputs. Its `genome_config` has two attributes more: `positive_start`,
+    and `generator`, which must be set before array genomes are made, since they draw from it.
     """
     inputs, hidden, outputs = shape
     config = neat.Config.__new__(neat.Config)
@@ -180,60 +174,3 @@ def _parsed(kind: Any, settings: EvolutionSettings, names: Iterable[str], **othe
     """What `kind` makes of some of the settings, which have neat-python's names, and others; a file is all text."""
     items = {name: getattr(settings, name) for name in names} | others
     return kind.parse_config({name: str(value) for name, value in items.items()})
-
-
-def machinery(config: neat.Config) -> tuple[SteadyReproduction, DefaultSpeciesSet]:
-    """Reproduction and species of one subpopulation, as new."""
-    reporters = ReporterSet()
-    stagnation = neat.DefaultStagnation(config.stagnation_config, reporters)
-    species_set = DefaultSpeciesSet(config.species_set_config, reporters)
-    species_set.indexer = counter(1)
-    return SteadyReproduction(config.reproduction_config, reporters, stagnation), species_set
-
-
-def state_of(config: neat.Config, reproduction: SteadyReproduction, species_set: DefaultSpeciesSet) -> dict[str, Any]:
-    """Counters and species as numbers, strings, lists and dicts."""
-    return {
-        "next_genome": peek(reproduction.genome_indexer),
-        "next_species": peek(species_set.indexer),
-        "next_node": peek(config.genome_config.node_indexer),
-        "next_innovation": reproduction.innovation_tracker.global_counter + 1,
-        "species": [
-            {name: getattr(species, name) for name in ("key", "created", "last_improved")}
-            | {"representative": species.representative.key, "members": list(species.members)}
-            | {"fitness_history": list(species.fitness_history)}
-            for species in species_set.species.values()
-        ],
-    }
-
-
-def restore(
-    config: neat.Config,
-    reproduction: SteadyReproduction,
-    species_set: DefaultSpeciesSet,
-    state: Mapping[str, Any],
-    genomes: Mapping[int, Any],
-) -> None:
-    """Bring counters and species, as new, into the state that `state_of` gave.
-
-    Raises:
-        KeyError, OverflowError, TypeError, ValueError: the state is none, or does not fit the genomes.
-    """
-    reproduction.genome_indexer = counter(state["next_genome"])
-    reproduction.innovation_tracker.global_counter = state["next_innovation"] - 1
-    config.genome_config.node_indexer = counter(state["next_node"])
-    species_set.indexer = counter(state["next_species"])
-    for entry in state["species"]:
-        species = Species(int(entry["key"]), int(entry["created"]))
-        species.last_improved = int(entry["last_improved"])
-        species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
-        if not all(map(math.isfinite, species.fitness_history)):
-            raise ValueError(f"species {species.key}: expected finite fitness, got {species.fitness_history}")
-        if species.key in species_set.species or not entry["members"]:
-            raise ValueError(f"species {species.key}: comes twice, or has no members")
-        members = {int(key): genomes[int(key)] for key in entry["members"]}
-        species.update(genomes[int(entry["representative"])], members)
-        species_set.species[species.key] = species
-        species_set.genome_to_species |= dict.fromkeys(members, species.key)
-    if sorted(key for species in species_set.species.values() for key in species.members) != sorted(genomes):
-        raise ValueError("expected every genome in one species")

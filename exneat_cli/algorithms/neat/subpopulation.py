@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import neat
+from neat.reporting import ReporterSet
+from neat.species import DefaultSpeciesSet, Species
 from numpy.random import PCG64, Generator, SeedSequence
 
 from exneat_cli.algorithms.algorithm import State
-from exneat_cli.algorithms.neat.conversion import from_stock
+from exneat_cli.algorithms.neat.conversion import Columns, from_stock, pack, unpack
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.neat_python import LARGEST_ID, drawing_from, machinery, restore, state_of
-from exneat_cli.algorithms.neat.packing import pack, unpack
+from exneat_cli.algorithms.neat.neat_python import LARGEST_ID, SteadyReproduction, counter, drawing_from, peek
 from exneat_cli.seeding import generator_in
 
 
@@ -43,7 +45,11 @@ class Subpopulation:
         self.config = config
         self._in_arrays = config.genome_type is ArrayGenome
         self._chance = random.Random()
-        self._reproduction, self._species = machinery(config)
+        reporters = ReporterSet()
+        stagnation = neat.DefaultStagnation(config.stagnation_config, reporters)
+        self._reproduction = SteadyReproduction(config.reproduction_config, reporters, stagnation)
+        self._species = DefaultSpeciesSet(config.species_set_config, reporters)
+        self._species.indexer = counter(1)
         self._generation = 0
 
     def _create(self) -> dict[int, Any]:
@@ -61,11 +67,7 @@ class Subpopulation:
         return genome
 
     def advance(self, fitness: Mapping[int, float]) -> bool:
-        """Replace the generation by the next one; returns whether all species had died out.
-
-        Args:
-            fitness: of every current genome, by id.
-        """
+        """Replace the generation, by the fitness of each genome's id; returns whether all species had died out."""
         for key, genome in self.genomes.items():
             genome.fitness = fitness[key]
         with drawing_from(self._chance):
@@ -87,9 +89,18 @@ class Subpopulation:
             "generation": self._generation,
             "random": [version, list(words), next_gauss],
             "generator": None if generator is None else dict(generator.bit_generator.state),
-            **state_of(self.config, self._reproduction, self._species),
+            "next_genome": peek(self._reproduction.genome_indexer),
+            "next_species": peek(self._species.indexer),
+            "next_node": peek(self.config.genome_config.node_indexer),
+            "next_innovation": self._reproduction.innovation_tracker.global_counter + 1,
+            "species": [
+                {name: getattr(species, name) for name in ("key", "created", "last_improved")}
+                | {"representative": species.representative.key, "members": list(species.members)}
+                | {"fitness_history": list(species.fitness_history)}
+                for species in self._species.species.values()
+            ],
         }
-        return State(plain, pack(list(self.genomes.values()), prefix))
+        return plain, pack(list(self.genomes.values()), prefix)
 
     @classmethod
     def restored(cls, config: neat.Config, state: State, prefix: str) -> Subpopulation:
@@ -99,29 +110,52 @@ class Subpopulation:
             AttributeError, KeyError, OverflowError, TypeError, ValueError: the state is none, or does not fit.
         """
         plain, columns = state
-        subpopulation = cls.__new__(cls)
-        subpopulation._equip(config)
-        items, stock = config.genome_config, not subpopulation._in_arrays
+        own, items = cls.__new__(cls), config.genome_config
+        own._equip(config)
         shape = items.num_inputs, items.num_hidden, items.num_outputs
-        genomes = unpack(columns, prefix, shape, feed_forward=items.feed_forward, stock=stock)
+        genomes = unpack(columns, prefix, shape, feed_forward=items.feed_forward, stock=not own._in_arrays)
         if len(genomes) != config.pop_size:
             raise ValueError(f"expected {config.pop_size} genomes, got {len(genomes)}")
-        subpopulation.genomes = {genome.key: genome for genome in genomes}
-        subpopulation._generation = int(plain["generation"])
+        own.genomes = {genome.key: genome for genome in genomes}
         version, words, next_gauss = plain["random"]
-        gauss = None if next_gauss is None else float(next_gauss)
-        subpopulation._chance.setstate((int(version), tuple(words), gauss))
-        if not stock:
+        own._chance.setstate((int(version), tuple(words), None if next_gauss is None else float(next_gauss)))
+        if own._in_arrays:
             items.generator = generator_in(plain["generator"])
-        restore(config, subpopulation._reproduction, subpopulation._species, plain, subpopulation.genomes)
+        own._restore_species(plain["species"])
+        own._restore_counters(plain, columns, prefix)
+        return own
+
+    def _restore_species(self, entries: Iterable[Mapping[str, Any]]) -> None:
+        there = self._species.species
+        for entry in entries:
+            species = Species(int(entry["key"]), int(entry["created"]))
+            species.last_improved = int(entry["last_improved"])
+            species.fitness_history = [float(fitness) for fitness in entry["fitness_history"]]
+            if not all(map(math.isfinite, species.fitness_history)):
+                raise ValueError(f"species {species.key}: expected finite fitness, got {species.fitness_history}")
+            if species.key in there or not entry["members"]:
+                raise ValueError(f"species {species.key}: comes twice, or has no members")
+            members = {int(key): self.genomes[int(key)] for key in entry["members"]}
+            species.update(self.genomes[int(entry["representative"])], members)
+            there[species.key] = species
+            self._species.genome_to_species |= dict.fromkeys(members, species.key)
+        if sorted(key for species in there.values() for key in species.members) != sorted(self.genomes):
+            raise ValueError("expected every genome in one species")
+
+    def _restore_counters(self, plain: Mapping[str, Any], columns: Columns, prefix: str) -> None:
+        """After genomes and species, which they must be ahead of."""
         given = {
             "generation": -1,
-            "next_genome": max(subpopulation.genomes),
-            "next_species": max(subpopulation._species.species),
+            "next_genome": max(self.genomes),
+            "next_species": max(self._species.species),
             "next_node": columns[f"{prefix}.node.key"].max(),
             "next_innovation": columns[f"{prefix}.connection.innovation"].max(initial=0),
         }
         for name, last in given.items():
             if not last < plain[name] < LARGEST_ID:
                 raise ValueError(f"{name}: expected more than {last}, got {plain[name]}")
-        return subpopulation
+        self._generation = int(plain["generation"])
+        self._reproduction.genome_indexer = counter(plain["next_genome"])
+        self._reproduction.innovation_tracker.global_counter = plain["next_innovation"] - 1
+        self._species.indexer = counter(plain["next_species"])
+        self.config.genome_config.node_indexer = counter(plain["next_node"])

@@ -73,14 +73,13 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
         Red is channel 1, blue channel 2, black wall, green the agent (A), yellow the goal or free prey (o).
         """
+        draw: Any = {"ansi": _as_text, "rgb_array": _as_picture}.get(self.render_mode or "")
+        if draw is None:
+            gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
+            return None
         world = self._simulation.world
         agent = int(world.agent[ROW]), int(world.agent[COLUMN])
-        if self.render_mode == "ansi":
-            return _as_text(self.task.tiles(world), agent, self.task.targets(world))
-        if self.render_mode == "rgb_array":
-            return _as_picture(self.task.tiles(world), agent, self.task.targets(world))
-        gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
-        return None
+        return draw(self.task.tiles(world), agent, self.task.targets(world))
 
     def _observe(self) -> NDArray[np.float64]:
         self._simulation.observe(self._simulation.world, self._observation)

@@ -1,4 +1,4 @@
-"""What both mazes share: the way to the goal, scoring, and the compiled episode after its reset.
+"""What happens in both mazes: the way to the goal, scoring, and the compiled episode after its reset.
 
 A maze is solved when the agent stands on the goal. The episode ends there, or `t_fast + SPARE_STEPS` steps
 after its start, `t_fast` being the walking distance from start to goal. Its fitness, paid at the last
@@ -13,32 +13,17 @@ the sign of the time term reversed: taken literally, a failure would score over 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
-from exneat_cli.errors import ConfigError, check_choice, check_real, check_whole
-from exneat_cli.tasks.grid.world import (
-    CHANNELS,
-    COLUMN,
-    COLUMN_STEPS,
-    ROW,
-    ROW_STEPS,
-    STEPS,
-    GridTask,
-    move,
-    sense_neighbours,
-)
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
+from exneat_cli.tasks.grid.world import COLUMN, COLUMN_STEPS, ROW, ROW_STEPS, STEPS, move
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 
 SPARE_STEPS = 2
 """Steps allowed beyond the fastest way (Zhang, 2025, section 3.2.1)."""
-TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
-"""What `task.fitness` may be -> weight of time in the fitness; progress has the rest."""
 GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST, START_ROW, START_COLUMN = range(6)
 """Entries of `Maze.goal`: where it is, walking distance from the start, largest distance in the maze, the start."""
 
@@ -51,58 +36,11 @@ class Maze(NamedTuple):
     agent: NDArray[np.int64]  #: (3,), see there
     distances: NDArray[np.int64]  #: (N, N) walking distances to the goal, -1 on walls
     goal: NDArray[np.int64]  #: (6,), see `GOAL_ROW`
-    time_share: float  #: see `TIME_SHARES`
+    time_share: float  #: weight of time in the fitness; progress has the rest
     cue_noise: float  #: sd of the noise on the cues of path tiles
     gap: int  #: silent tiles before the goal of a track
     cues_removed: float  #: share of the path tiles of a general maze
     walls_removed: float  #: share of the walls between its cells
-
-
-class MazeTask(GridTask):
-    """A maze with parameters that both kinds have; the dataclasses that derive from it declare them."""
-
-    size: int
-    cue_noise: float
-    fitness: str
-
-    terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
-    trace_columns: ClassVar[tuple[str, ...]] = ("row", "column", "goal_row", "goal_column")
-    """Row and column of the agent, then of the goal."""
-
-    @property
-    def longest_episode(self) -> int:
-        """No way leads over more than all tiles."""
-        return self.size**2 + SPARE_STEPS
-
-    def targets(self, world: Any) -> list[tuple[int, int]]:
-        """The goal."""
-        return [(int(world.goal[GOAL_ROW]), int(world.goal[GOAL_COLUMN]))]
-
-    def _check_maze(self) -> None:
-        check_whole("task.size", self.size, 5, 99)
-        if self.size % 2 == 0:
-            raise ConfigError("task.size", "an odd number of at least 5", self.size, "walls stand on the even tiles")
-        check_real("task.cue_noise", self.cue_noise, 0.0)
-        check_choice("task.fitness", self.fitness, list(TIME_SHARES))
-
-    def _open(
-        self, reset: Callable[..., Any], *, gap: int = 0, cues_removed: float = 0.0, walls_removed: float = 0.0
-    ) -> Simulation:
-        tiles = (self.size, self.size)
-        maze = Maze(
-            path=np.zeros(tiles, np.int64),
-            signals=np.zeros((CHANNELS, *tiles)),
-            agent=np.zeros(3, np.int64),
-            distances=np.zeros(tiles, np.int64),
-            goal=np.zeros(6, np.int64),
-            time_share=TIME_SHARES[self.fitness],
-            # A whole number would be another type to the compiler, and compiled apart.
-            cue_noise=float(self.cue_noise),
-            gap=gap,
-            cues_removed=float(cues_removed),
-            walls_removed=float(walls_removed),
-        )
-        return Simulation(maze, reset, rewind, observe, step, locate)
 
 
 @compiled
@@ -142,30 +80,11 @@ def measure_distances(path: NDArray[np.int64], goal: tuple[int, int], distances:
     return furthest
 
 
-@compiled
-def add_cue_noise(maze: Maze, rng: Generator) -> None:
-    """Add noise to the cues of path tiles, in the order of rows, columns and channels; cues stay at least 0."""
-    if maze.cue_noise == 0.0:  # draws nothing then
-        return
-    for row in range(maze.path.shape[0]):
-        for column in range(maze.path.shape[0]):
-            if maze.path[row, column] == 1:
-                for channel in range(CHANNELS):
-                    noisy = maze.signals[channel, row, column] + rng.normal(0.0, maze.cue_noise)
-                    maze.signals[channel, row, column] = max(noisy, 0.0)
-
-
 @compiled_lean
 def rewind(maze: Maze) -> None:
     """Put the agent back to its start."""
     agent, goal = maze.agent, maze.goal
     agent[ROW], agent[COLUMN], agent[STEPS] = goal[START_ROW], goal[START_COLUMN], 0
-
-
-@compiled_lean
-def observe(maze: Maze, observation: NDArray[np.float64]) -> None:
-    """Write the cues of the four neighbours."""
-    sense_neighbours(maze.signals, maze.agent, observation)
 
 
 @compiled_lean

@@ -64,9 +64,12 @@ class Foraging(GridTask):
     terms: ClassVar[tuple[str, ...]] = ("caught",)
     channels: ClassVar[int] = 1
     """On which each prey emits."""
+    p_m = 0.0
+    motion = "brownian"
+    """Prey never move here; no settings, see `Hunting`."""
 
     def __post_init__(self) -> None:
-        check_choice("task.name", self.name, ["foraging" if self.channels == 1 else "hunting"])
+        check_choice("task.name", self.name, [type(self).name])
         check_whole("task.size", self.size, 3, 99)
         check_whole("task.n_prey", self.n_prey, 1, self.size**2 - 1)
         check_whole("task.steps", self.steps, 1, 1_000_000)
@@ -75,9 +78,6 @@ class Foraging(GridTask):
         check_whole("task.patch_width", self.patch_width, 1, 15)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
-        self._check_memory()
-
-    def _check_memory(self) -> None:
         per_prey = (self.size + 2) ** 2 * self.channels
         most_prey, most_steps = MOST_CUES // per_prey, MOST_CUES // (per_prey * self.n_prey)
         fix = "the cues of every prey, tile and step are kept: make steps, size or n_prey smaller"
@@ -99,9 +99,6 @@ class Foraging(GridTask):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new field."""
-        return self._open(motion=0.0, levy=False)
-
-    def _open(self, *, motion: float, levy: bool) -> Simulation:
         tiles, prey = (self.size + 2, self.size + 2), self.n_prey
         field = Field(
             path=np.zeros(tiles, np.int64),
@@ -116,8 +113,8 @@ class Foraging(GridTask):
             channels=self.channels,
             emission=float(self.p_e),
             keep=1.0 - self.p_c,
-            motion=float(motion),
-            levy=levy,
+            motion=float(self.p_m),
+            levy=self.motion == "levy",
         )
         return Simulation(field, reset, rewind, observe, step, locate)
 
@@ -157,10 +154,6 @@ class Hunting(Foraging):
         super().__post_init__()
         check_real("task.p_m", self.p_m, 0.0, 1.0)
         check_choice("task.motion", self.motion, MOTIONS)
-
-    def open(self, *, training: bool) -> Simulation:
-        """Open a new field."""
-        return self._open(motion=self.p_m, levy=self.motion == "levy")
 
 
 @compiled

@@ -16,7 +16,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
-from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS
+from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, draw_tiles
 
 LONGEST_FLIGHT = 7
 FLIGHT_CHANCE = np.cumsum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0) / np.sum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0)
@@ -65,29 +65,14 @@ def draw_prey(field: Field, rng: Generator) -> None:
     """Put prey on distinct tiles but the centre, and draw where they go and what they emit at every step."""
     field.path[:] = 0
     field.path[1:-1, 1:-1] = 1
-    draw_starts(field.start, field.path.shape[0], rng)
+    vacant, centre = field.path.copy(), field.path.shape[0] // 2
+    vacant[centre, centre] = 0  # where the agent starts
+    field.start[:] = draw_tiles(vacant, field.start.shape[0], rng)
     walkers = np.zeros((field.start.shape[0], 4), np.int64)
     walkers[:, :2] = field.start
     shuffled = field.patch.copy()
     for t in range(field.cues.shape[0]):
         draw_moment(field, t, walkers, shuffled, rng)
-
-
-@compiled
-def draw_starts(start: NDArray[np.int64], size: int, rng: Generator) -> None:
-    """Draw `start`, (n_prey, 2), from all open tiles but the centre, where the agent starts."""
-    tiles, count = np.empty((size * size, 2), np.int64), 0
-    for row in range(1, size - 1):
-        for column in range(1, size - 1):
-            if row != size // 2 or column != size // 2:
-                tiles[count, 0], tiles[count, 1] = row, column
-                count += 1
-    # The first steps of a Fisher-Yates shuffle.
-    for k in range(start.shape[0]):
-        chosen = k + int(rng.integers(0, count - k))
-        for axis in range(2):
-            start[k, axis] = tiles[chosen, axis]
-            tiles[chosen, axis] = tiles[k, axis]
 
 
 @compiled

@@ -15,8 +15,8 @@ Observation (8 numbers without a unit, clipped to [0, 1]):
 Action (5 numbers, the value of each move): 0 left, 1 right, 2 up, 3 down, 4 stay. The largest wins, after
 U(0, 1e-3) is added to each so that ties break fairly. A step into a wall stays.
 
-A new world is a file with a frozen dataclass that derives from `GridTask` (`exneat_cli.tasks.grid.track_maze` is the
-shortest to start from), a line in `exneat_cli.tasks.TASKS`, and a YAML file in `conf/task`.
+A new world is a file with a frozen dataclass that derives from `GridTask` (the track of `exneat_cli.tasks.grid.mazes`
+is the shortest to start from), a line in `exneat_cli.tasks.TASKS`, and a YAML file in `conf/task`.
 
 Source: Zhang (2025), section 3.2.
 """
@@ -26,9 +26,10 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from exneat_cli.compiling import compiled_lean
+from exneat_cli.compiling import compiled, compiled_lean
 from exneat_cli.tasks.task import Part, Task
 
 CHANNELS = 2
@@ -70,35 +71,45 @@ class GridTask(Task):
     @property
     def resting_action(self) -> NDArray[np.float64]:
         """The action that stays where it is."""
-        action: NDArray[np.float64] = np.eye(len(MOVES))[STAY]
-        return action
+        return np.asarray(np.eye(len(MOVES))[STAY])
 
     def tiles(self, world: Any) -> NDArray[np.float64]:
         """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
-        tiles: NDArray[np.float64] = np.stack([world.path, *world.signals], axis=2)
-        return tiles
+        return np.asarray(np.stack([world.path, *world.signals], axis=2))
 
     def targets(self, world: Any) -> list[tuple[int, int]]:
         """Row and column of everything that the agent still looks for, to be drawn."""
         return []
 
 
+@compiled
+def draw_tiles(eligible: NDArray[np.int64], count: int, rng: Generator) -> NDArray[np.int64]:
+    """(count, 2) rows and columns of different tiles, drawn from those that are not 0 in `eligible`, (N, N)."""
+    tiles = np.argwhere(eligible)
+    # The first steps of a Fisher-Yates shuffle.
+    for k in range(count):
+        other = k + int(rng.integers(0, tiles.shape[0] - k))
+        for axis in range(2):
+            tiles[k, axis], tiles[other, axis] = tiles[other, axis], tiles[k, axis]
+    return tiles[:count]
+
+
 @compiled_lean
-def sense_neighbours(signals: NDArray[np.float64], agent: NDArray[np.int64], observation: NDArray[np.float64]) -> None:
+def observe(world, observation):  # type: ignore[no-untyped-def]
     """Write both channels of the four neighbours, unclipped, into `observation`, (8,)."""
+    signals, agent = world.signals, world.agent
     for side in range(4):
         row = agent[ROW] + ROW_STEPS[side]
         column = agent[COLUMN] + COLUMN_STEPS[side]
-        observation[CHANNELS * side] = signals[0, row, column]
-        observation[CHANNELS * side + 1] = signals[1, row, column]
+        for channel in range(CHANNELS):
+            observation[CHANNELS * side + channel] = signals[channel, row, column]
 
 
 @compiled_lean
 def move(path: NDArray[np.int64], agent: NDArray[np.int64], action: NDArray[np.float64]) -> bool:
     """Take the step with the largest value, or stay in front of a wall; counts the step.
 
-    Returns:
-        Whether all values were finite; if not, nothing moves.
+    Returns whether all values were finite; if not, nothing moves.
     """
     # The largest value wins; the noise that breaks ties was added before.
     choice = 0

@@ -6,17 +6,30 @@ operation by operation, so that results agree to the last bits.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import functools
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import llvmlite.binding
+import mujoco
 import numpy as np
+from numba import types
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
+from exneat_cli.errors import ExneatError
 from exneat_cli.tasks.robots import frames
 from exneat_cli.tasks.robots.frames import Frames
-from exneat_cli.tasks.robots.mujoco_library import mj_forward, mj_resetData, mj_rnePostConstraint, mj_step
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
+
+_SYMBOLS = ("mj_step", "mj_forward", "mj_resetData", "mj_rnePostConstraint")
+_LIBRARY_PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
+
+# MuJoCo's C functions; each takes the addresses of an mjModel and an mjData. `types.ExternalFunction` keeps the
+# symbol's name instead of an address, so code that calls it can be cached between processes.
+_functions: list[Any] = [types.ExternalFunction(name, types.void(types.int64, types.int64)) for name in _SYMBOLS]
+mj_step, mj_forward, mj_resetData, mj_rnePostConstraint = _functions
 
 STEPS, STUCK_STEPS, WARNINGS = range(3)
 """Entries of `RobotWorld.clock`: steps done, steps without progress, MuJoCo's warnings at the reset."""
@@ -35,7 +48,6 @@ class RobotWorld(NamedTuple):
     cfrc_ext: NDArray[np.float64]  #: (nbody, 6), N m and N
     warnings: NDArray[np.int32]  #: counters
     initial_qpos: NDArray[np.float64]  #: the pose that a reset disturbs
-    initial_qvel: NDArray[np.float64]
     start_qpos: NDArray[np.float64]  #: what the reset made of it
     start_qvel: NDArray[np.float64]
     positions: NDArray[np.int64]  #: entries of `qpos` that are read
@@ -72,6 +84,30 @@ class RobotWorld(NamedTuple):
     mark: NDArray[np.float64]  #: (1,), x in m that progress is measured from
 
 
+@functools.cache
+def load_library() -> None:
+    """Let compiled code call MuJoCo: load the library that its Python bindings use into LLVM as well.
+
+    Raises:
+        ExneatError: its library is not beside its Python bindings, cannot be loaded or lacks a function.
+    """
+    directory = Path(mujoco.__file__).parent
+    libraries = [path for pattern in _LIBRARY_PATTERNS for path in sorted(directory.glob(pattern))]
+    fix = "install MuJoCo from its wheel, which holds its library: pip install --force-reinstall mujoco"
+    if not libraries:
+        raise ExneatError(f"MuJoCo: expected its library in {directory}, got none\n  {fix}")
+    try:
+        llvmlite.binding.load_library_permanently(str(libraries[0]))
+    except RuntimeError as error:
+        raise ExneatError(f"MuJoCo: {libraries[0].name} could not be loaded: {error}\n  {fix}") from error
+    # Compiled code that calls what is not there would take the process down.
+    missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
+    if missing:
+        raise ExneatError(f"MuJoCo: {libraries[0].name} has no {', '.join(missing)}\n  {fix}")
+    # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
+    mujoco.set_mju_user_warning(lambda message: None)
+
+
 @compiled
 def reset(world: RobotWorld, rng: Generator) -> None:
     """Put the body near its initial pose, as Gymnasium does with the same generator."""
@@ -80,9 +116,9 @@ def reset(world: RobotWorld, rng: Generator) -> None:
         world.start_qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
     for i in range(world.qvel.size):
         if world.normal:
-            world.start_qvel[i] = world.initial_qvel[i] + world.reset_scale * rng.standard_normal()
+            world.start_qvel[i] = world.reset_scale * rng.standard_normal()
         else:
-            world.start_qvel[i] = world.initial_qvel[i] + rng.uniform(-world.reset_scale, world.reset_scale)
+            world.start_qvel[i] = rng.uniform(-world.reset_scale, world.reset_scale)
     rewind(world)
 
 

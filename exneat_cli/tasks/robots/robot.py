@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
-from exneat_cli.tasks.robots import dynamics, mujoco_library
+from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
 from exneat_cli.tasks.robots.models import load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, read_off
@@ -147,8 +147,7 @@ class RobotTask(Task):
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
-        mujoco_library.load_library()
-        mujoco_library.silence_warnings()
+        dynamics.load_library()
         model, data = load(self.model), mujoco.MjData(load(self.model))
         world = dynamics.RobotWorld(
             model=model._address,
@@ -161,7 +160,6 @@ class RobotTask(Task):
             cfrc_ext=data.cfrc_ext,
             warnings=data.warning.number,
             initial_qpos=data.qpos.copy(),
-            initial_qvel=data.qvel.copy(),
             start_qpos=data.qpos.copy(),
             start_qvel=data.qvel.copy(),
             clock=np.zeros(3, dtype=np.int64),

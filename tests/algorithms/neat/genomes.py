@@ -15,7 +15,7 @@ from scipy.stats import chi2_contingency, ks_2samp
 
 from exneat_cli.algorithms import RECURRENT, ArrayGenome, EvolutionSettings, neat_config
 from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
-from exneat_cli.algorithms.neat.neat_python import machinery
+from exneat_cli.algorithms.neat.neat_python import SteadyReproduction
 
 ALPHA = 1e-4
 """Seeds are fixed, so a test that holds once holds always."""
@@ -42,13 +42,18 @@ def seeded_config(settings: EvolutionSettings, shape: tuple[int, int, int], seed
     random.seed(seed)
     config = neat_config(settings, 2, shape)
     config.genome_config.generator = Generator(PCG64(seed))
-    config.genome_config.innovation_tracker = machinery(config)[0].innovation_tracker
+    config.genome_config.innovation_tracker = reproduction_of(config).innovation_tracker
     return config
 
 
 def initial_genomes(config: neat.Config, number: int) -> list[Any]:
     """Genomes of a first generation, of the configuration's class."""
-    return list(machinery(config)[0].create_new(config.genome_type, config.genome_config, number).values())
+    return list(reproduction_of(config).create_new(config.genome_type, config.genome_config, number).values())
+
+
+def reproduction_of(config: neat.Config) -> SteadyReproduction:
+    """Reproduction as new, without species."""
+    return SteadyReproduction(config.reproduction_config, None, None)  # type: ignore[arg-type]
 
 
 def relatives(config: neat.Config, number: int, births: int) -> list[Any]:

@@ -106,8 +106,8 @@ def test_threads_that_draw_from_pythons_generator_change_nothing(genome: str) ->
     def evolved() -> list[object]:
         evolution = Coevolution(problem_of(EvolutionSettings(genome=genome), 30))
         for _ in range(6):
-            tell(evolution, [synthetic(team) for team in evolution.ask().teams])
-        return [contents(team.genomes[0]) for team in evolution.ask().teams]
+            tell(evolution, [synthetic(team) for team in evolution.ask()[0]])
+        return [contents(team.genomes[0]) for team in evolution.ask()[0]]
 
     alone = evolved()
     with somebody_who_draws():
@@ -120,7 +120,7 @@ def test_no_run_aborts_in_fifty_generations(column: str, shape: tuple[int, int, 
     evolution = Coevolution(problem_of(COLUMNS[column], population, 2, shape=shape, seed=population))
     rng = np.random.default_rng(population)
     for generation in range(50):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         assert len(teams) == population
         # Alternating smooth, tied and wild fitness drives the number of species up and down.
         kind = generation % 3
@@ -132,7 +132,7 @@ def test_many_species_share_what_the_population_can_give_and_settings_stay() -> 
     settings = replace(RECURRENT, compatibility_threshold=0.0)
     evolution = Coevolution(problem_of(settings, 30, shape=(2, 0, 1)))
     for generation in range(5):
-        teams = evolution.ask().teams
+        teams = evolution.ask()[0]
         assert evolution.columns()["species"] == 30
         tell(evolution, [float(index + generation) for index in range(len(teams))])
     configured = evolution._subpopulations[0].config.reproduction_config

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from exneat_cli.algorithms import ACTIVATIONS, RECURRENT, ArrayGenome, EvolutionSettings, from_stock, to_stock
+from exneat_cli.algorithms.neat.genes import draw
 from exneat_cli.algorithms.neat.genome import number
-from exneat_cli.algorithms.neat.operators import draw
 from tests.algorithms.neat.genomes import (
     COLUMNS,
     NO_ATTRIBUTES,

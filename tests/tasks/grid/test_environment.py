@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from exneat_cli.brains import RandomActions, linear_fusion
+from exneat_cli.brains import linear_fusion
 from exneat_cli.errors import ConfigError
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import generator, training_episodes
@@ -35,15 +35,14 @@ def test_the_checker_of_gymnasium_has_nothing_to_say(world: str) -> None:
 def test_the_loop_of_gymnasium_and_the_compiled_episode_agree_step_by_step(world: str, at_random: bool) -> None:
     env: Any = gymnasium.make(world, **PARAMETERS[world])
     task = WORLDS[world](**PARAMETERS[world])
-    acting = RandomActions(*task.action_bounds) if at_random else linear_fusion(8, 5, task.parts)
+    acting = None if at_random else linear_fusion(8, 5, task.parts)
     located = len(task.trace_columns)
     place = np.zeros(located)
     with Runner(task, Noise(), Executor("serial"), training=False) as runner:
         for seeds in training_episodes(11, 0, 60):
-            trace = runner.trace(acting, seeds).steps
+            trace, _ = runner.trace(acting, seeds)
             # The same episode again: for each move five draws, which choose alone or break ties.
-            choices = generator(seeds.actions)
-            env.unwrapped.np_random = generator(seeds.world)
+            env.unwrapped.np_random, _, choices = map(generator, seeds)
             observation, _ = env.reset()
             rewards, over = [], False
             while not over:

@@ -13,12 +13,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.stats import chisquare
 
-from exneat_cli.brains import RandomActions, linear_fusion
+from exneat_cli.brains import linear_fusion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.seeding import shared_episodes
 from exneat_cli.tasks import ENDED, RUNNING, GeneralMaze, TrackMaze
-from exneat_cli.tasks.grid.general_maze import carve
 from exneat_cli.tasks.grid.maze import FURTHEST, GOAL_COLUMN, GOAL_ROW, Maze, locate, step
+from exneat_cli.tasks.grid.mazes import carve
 from exneat_cli.tasks.grid.world import MOVES, STAY
 
 ODD = st.integers(2, 15).map(lambda k: 2 * k + 1)
@@ -211,9 +211,9 @@ def test_a_step_into_a_wall_stays() -> None:
 def test_linear_fusion_solves_every_noiseless_maze_perfectly_and_chance_is_far_below(
     task: TrackMaze | GeneralMaze,
 ) -> None:
-    fusion, chance = linear_fusion(8, 5, task.parts), RandomActions(*task.action_bounds)
+    fusion = linear_fusion(8, 5, task.parts)
     episodes = shared_episodes("test", 100)
     with Runner(task, Noise(), Executor(), training=False) as runner:
-        outcomes, luck = runner.run([fusion], episodes), runner.run(chance, episodes)
+        outcomes, luck = runner.run([fusion], episodes), runner.run(None, episodes)
     assert outcomes.fitness.tolist() == [[1.0] * 100]
     assert luck.fitness.mean() < (0.5 if task.size == 5 else 0.35)

@@ -12,7 +12,7 @@ import pytest
 
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.tasks import ENDED, FAILED, RUNNING, AntTask, Simulation
-from exneat_cli.tasks.robots import mujoco_library
+from exneat_cli.tasks.robots import dynamics
 
 STEPS = 1000
 GYMNASIUM_TERMS = ("reward_forward", "reward_survive", "reward_ctrl", "reward_contact")
@@ -163,11 +163,11 @@ def test_a_missing_or_broken_library_of_mujoco_is_refused_in_words(
 ) -> None:
     monkeypatch.setattr(mujoco, "__file__", str(tmp_path / "__init__.py"))
     with pytest.raises(ExneatError, match="expected its library in"):
-        mujoco_library.load_library.__wrapped__()
+        dynamics.load_library.__wrapped__()
     (tmp_path / "libmujoco.so.9").write_bytes(b"no library")
     with pytest.raises(ExneatError, match=r"libmujoco\.so\.9 could not be loaded"):
-        mujoco_library.load_library.__wrapped__()
+        dynamics.load_library.__wrapped__()
     monkeypatch.undo()
-    monkeypatch.setattr(mujoco_library, "_SYMBOLS", ("mj_fly",))
+    monkeypatch.setattr(dynamics, "_SYMBOLS", ("mj_fly",))
     with pytest.raises(ExneatError, match="has no mj_fly"):
-        mujoco_library.load_library.__wrapped__()
+        dynamics.load_library.__wrapped__()
