@@ -138,6 +138,11 @@ class Task(ABC):
         return self.observation_size
 
     @property
+    def whole(self) -> tuple[int, ...]:
+        """Entries of what is sensed for a single network that senses everything, each thing once."""
+        return tuple(range(self.sensed_size))
+
+    @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest sensible action, one entry per actuator."""
         ones = np.ones(len(self.actuator_names))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings
 from exneat_cli.errors import ConfigError
 from exneat_cli.tasks import AntTask, Part, Task
-from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, counter_clockwise, plan_body, plan_modules
+from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, peers_of, plan_body, plan_modules
 
 AROUND = ["front_left", "back_left", "back_right", "front_right"]
 
@@ -46,11 +46,11 @@ def test_every_actuator_is_driven_once_with_and_without_a_central_module() -> No
     assert sorted(a for module in ant_plan(central=False).modules for a in module.drives) == list(range(8))
 
 
-def test_peers_come_counter_clockwise_from_the_own_leg() -> None:
+def test_peers_come_peers_of_from_the_own_leg() -> None:
     legs = AntTask().parts
     for own, leg in enumerate(legs):
         start = AROUND.index(leg.name)
-        assert [legs[peer].name for peer in counter_clockwise(legs, own)] == (AROUND * 2)[start + 1 : start + 4]
+        assert [legs[peer].name for peer in peers_of(legs, own)] == (AROUND * 2)[start + 1 : start + 4]
 
 
 def test_links_of_a_shared_genome_mean_the_same_at_every_leg_and_are_delayed() -> None:

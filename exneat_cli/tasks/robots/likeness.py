@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 _PLACES = 1e-3
 """Of the model's extent: places nearer to each other than this are the same, and so are directions (as sines)."""
 _SHARE = 0.2
-"""Masses, damping, friction loss and armature may differ by this share of the larger one, stiffness by this share of the
-body's largest: the armature of Humanoid's hips differs by 20%, and one of its knees has a spring of 1 N m/rad, the
+"""Masses, damping, friction loss and armature may differ by this share of the larger one, stiffness by this share of
+the body's largest: the armature of Humanoid's hips differs by 20%, and one of its knees has a spring of 1 N m/rad, the
 other none, beside hips of 20."""
 _ROUND_OFF = 1e-6
 """Relative tolerance of what must be equal: ranges, gears, sizes, friction."""
