@@ -150,7 +150,7 @@ class AntTask(Task):
         return self.open_disturbed(training=training, reset_scale=RESET_SCALE)
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
-        """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
+        """Open a new world with noise of this size on the initial pose; only in training does patience end episodes."""
         dynamics.load_library()
         model = _model()
         data = mujoco.MjData(model)
