@@ -61,8 +61,7 @@ def _episodes(  # type: ignore[no-untyped-def]
         totals[b] = 0.0
         means[b] = 0.0
         squares[b] = 0.0
-        t = 0
-        status = RUNNING
+        t, status = 0, RUNNING
         while True:
             if t < trace.shape[0]:
                 if located > 0:
@@ -75,10 +74,10 @@ def _episodes(  # type: ignore[no-untyped-def]
                 return
             # Noise is drawn when the first brain needs it and kept for the others: all of them face the same.
             if t == drawn:
-                _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise[t], action_noise[t])
+                _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise, t)
                 drawn += 1
             observe(world, readings)  # type: ignore[name-defined]  # noqa: F821
-            _disturb(readings, sensor_noise[t], disturbance)
+            _disturb(readings, sensor_noise, t, disturbance)
             sense(world, readings, sensed)  # type: ignore[name-defined]  # noqa: F821
             _add_moments(sensed, t, means[b], squares[b])
             activate(brains, b, memory, action)
@@ -94,21 +93,21 @@ def _episodes(  # type: ignore[no-untyped-def]
 
 
 @compiled_lean
-def _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise):  # type: ignore[no-untyped-def]
-    """Draw one step's noise on the readings and on the action, in their order."""
+def _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise, t):  # type: ignore[no-untyped-def]
+    """Draw the noise of step t on the readings and on the action, in their order."""
     sensor_std, _, _, action_low, action_span = disturbance
-    for i in range(sensor_noise.size):
-        sensor_noise[i] = sensor_rng.normal(0.0, sensor_std)
-    for i in range(action_noise.size):
-        action_noise[i] = action_low[i] + action_span[i] * action_rng.random()
+    for i in range(sensor_noise.shape[1]):
+        sensor_noise[t, i] = sensor_rng.normal(0.0, sensor_std)
+    for i in range(action_noise.shape[1]):
+        action_noise[t, i] = action_low[i] + action_span[i] * action_rng.random()
 
 
 @compiled_lean
-def _disturb(readings, noise, disturbance):  # type: ignore[no-untyped-def]
-    """Add noise to the readings and clip them, in place."""
+def _disturb(readings, noise, t, disturbance):  # type: ignore[no-untyped-def]
+    """Add the noise of step t to the readings and clip them, in place."""
     _, lowest, highest, _, _ = disturbance
-    for i in range(noise.size):
-        readings[i] += noise[i]
+    for i in range(noise.shape[1]):
+        readings[i] += noise[t, i]
     if highest < np.inf:
         for i in range(readings.size):
             readings[i] = min(max(readings[i], lowest), highest)
