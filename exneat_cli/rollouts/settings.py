@@ -71,19 +71,20 @@ class Noise:
 
     Attributes:
         sensor_std: sd of the normal noise on every reading at every step, in the reading's own unit.
-        reset_scale: size of the noise on the initial pose, uniform on positions (rad, m) and normal on
-            velocities (rad/s, m/s); 0.1 is the default of Gymnasium's Ant.
+        reset_scale: size of the noise on the initial pose, on positions (rad, m) and velocities (rad/s, m/s); None
+            takes the task's own.
 
     Raises:
         ConfigError: a value is negative or not finite.
     """
 
     sensor_std: float = 0.0
-    reset_scale: float = 0.1
+    reset_scale: float | None = None
 
     def __post_init__(self) -> None:
         check_real("noise.sensor_std", self.sensor_std, 0.0)
-        check_real("noise.reset_scale", self.reset_scale, 0.0)
+        if self.reset_scale is not None:
+            check_real("noise.reset_scale", self.reset_scale, 0.0)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +16,8 @@ from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
 _Part = TypeVar("_Part")
+_NO_POSE = 0.1
+"""The `noise.reset_scale` of tasks that have no initial pose: it disturbs nothing, and is part of hashes."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -83,10 +85,20 @@ class RunSettings:
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
-        if not isinstance(self.task, HasInitialPose) and self.noise.reset_scale != Noise().reset_scale:
-            fix = f"task={self.task.name} has no initial pose that noise could disturb"
-            raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, fix)
+        self._settle()
         _ = self.plan
+
+    def _settle(self) -> None:
+        """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
+        own = self.task.reset_scale if isinstance(self.task, HasInitialPose) else None
+        if own is None and self.noise.reset_scale not in (None, _NO_POSE):
+            fix = f"task={self.task.name} has no initial pose that noise could disturb"
+            raise ConfigError("noise.reset_scale", "null, its default", self.noise.reset_scale, fix)
+        if self.noise.reset_scale is None:
+            object.__setattr__(self, "noise", replace(self.noise, reset_scale=_NO_POSE if own is None else own))
+        if self.algorithm.modular:
+            subpopulations = self.geometry.subpopulations(self.task.parts)
+            object.__setattr__(self, "task", self.task.shared_by(subpopulations))
 
     @property
     def plan(self) -> Plan:
@@ -100,8 +112,12 @@ class RunSettings:
             return self.algorithm.name
         vector = self.geometry.subpopulations(self.task.parts) if self.geometry.vector else ()
         geometry = self.geometry.name + "".join(str(entry) for entry in vector)
-        decentral = self.task.trunk is not None and self.wiring.central is False
-        return f"{self.algorithm.name}-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
+        words = [self.algorithm.name, geometry, self.linkage]
+        if self.wiring.trunk != "none":
+            words.append(f"trunk{self.wiring.trunk}")
+        elif self.task.trunk is not None and self.wiring.central is False:
+            words.append("nocentral")
+        return "-".join(words)
 
     @property
     def trained_generations(self) -> int:
@@ -122,6 +138,9 @@ class RunSettings:
     def _identity(self) -> dict[str, Any]:
         """What is hashed: the settings with defaults that depend on the task spelled out."""
         plain = self.to_plain()
+        plain["task"] = self.task.identity()
+        if self.wiring.trunk == Wiring().trunk:  # came later: runs without it keep their hashes
+            del plain["wiring"]["trunk"]
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))

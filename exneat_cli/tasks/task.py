@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -137,6 +137,14 @@ class Task(ABC):
         """Length of what brains sense: the readings, unless the world has a `sense` of its own."""
         return self.observation_size
 
+    def identity(self) -> dict[str, Any]:
+        """The parameters that make two tasks the same, as plain data for a run's hash."""
+        return asdict(self)  # type: ignore[call-overload, no-any-return]
+
+    def shared_by(self, subpopulations: Sequence[int]) -> Task:
+        """The task once it is known which subpopulation each part belongs to, (parts,)."""
+        return self
+
     @property
     def whole(self) -> tuple[int, ...]:
         """Entries of what is sensed for a single network that senses everything, each thing once."""
@@ -169,6 +177,10 @@ class HasTiles(Protocol):
 @runtime_checkable
 class HasInitialPose(Protocol):
     """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
+
+    @property
+    def reset_scale(self) -> float:
+        """The size of this noise unless told otherwise."""
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world, with noise of this size on the initial pose."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import mujoco
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
 from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
-from exneat_cli.tasks.robots.models import load, rules_of
+from exneat_cli.tasks.robots.models import digest_of, load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, read_off
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
 from exneat_cli.tasks.task import Part, Simulation, Task
@@ -133,6 +133,24 @@ class RobotTask(Task):
         """`max_steps`."""
         return self.max_steps
 
+    @property
+    def reset_scale(self) -> float:
+        """Noise on the initial pose as the model's rules have it."""
+        return rules_of(self.model).reset_scale
+
+    def identity(self) -> dict[str, Any]:
+        """The parameters, with the model by its content."""
+        return {**asdict(self), "model": digest_of(self.model)}
+
+    def shared_by(self, subpopulations: Sequence[int]) -> RobotTask:
+        """With `symmetry` decided: turns if some sharers are alike by nothing else, else mirrorings."""
+        body = self._anatomy[0]
+        if self.frame == "world" or self.symmetry is not None or not body.symmetries:
+            return self
+        classes = set(zip(subpopulations, [limb.likeness for limb in body.limbs], strict=True))
+        turns = "turn" in body.symmetries and len(classes) > len(set(subpopulations))
+        return replace(self, symmetry="turn" if turns or "mirror" not in body.symmetries else "mirror")
+
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Forward reward of an episode, in m/s summed over control steps."""
         return np.asarray(totals[..., 0])
@@ -143,7 +161,7 @@ class RobotTask(Task):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new world with the model's own noise on the initial pose."""
-        return self.open_disturbed(training=training, reset_scale=rules_of(self.model).reset_scale)
+        return self.open_disturbed(training=training, reset_scale=self.reset_scale)
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
@@ -265,3 +283,12 @@ class AntTask(RobotTask):
     frame: str = "world"
     contact_forces: bool = True
     reward: str = "thesis"
+
+    def identity(self) -> dict[str, Any]:
+        """The parameters; those that came later count only where they change Ant as it always was."""
+        plain, before = super().identity(), AntTask()
+        later = ("model", "frame", "symmetry", "contact_forces", "part_bodies", "control_period")
+        kept = {
+            key: value for key, value in plain.items() if key not in later or getattr(self, key) != getattr(before, key)
+        }
+        return kept if self.frame == "part" else {key: value for key, value in kept.items() if key != "symmetry"}
