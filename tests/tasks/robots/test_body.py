@@ -134,22 +134,22 @@ def limb(
     y: float = 0.0,
     *,
     turned: float = 0.0,
-    out: float = 0.0,
-    length: float = 0.5,
+    top: str = "0 0 0",
+    tip: str = "0 0 -0.5",
     mass: float = 1.0,
     axis: str = "0 1 0",
     limits: str = "-20 60",
     damping: float = 1.0,
     gear: float = 50.0,
     control: str = "-1 1",
-    beyond: str = "",
+    beyond: tuple[str, ...] = (),
 ) -> str:
     """A body with one hinge, turned about z by degrees, and the hinge's motor; other limbs may hang on it."""
-    inner, motor = beyond.split("|") if beyond else ("", "")
+    inner, motors = ("".join(each.split("|")[k] for each in beyond) for k in (0, 1))
     return f"""<body name="{name}" pos="{x} {y} 0" euler="0 0 {turned}">
         <joint name="{name}" axis="{axis}" range="{limits}" damping="{damping}"/>
-        <geom type="capsule" size="0.03" fromto="0 0 0 {out} 0 -{length}" mass="{mass}"/>{inner}</body>
-        |<motor name="{name}" joint="{name}" gear="{gear}" ctrlrange="{control}"/>{motor}"""
+        <geom type="capsule" size="0.03" fromto="{top} {tip}" mass="{mass}"/>{inner}</body>
+        |<motor name="{name}" joint="{name}" gear="{gear}" ctrlrange="{control}"/>{motors}"""
 
 
 def legs(**changes: Any) -> list[str]:
@@ -164,14 +164,20 @@ def legs(**changes: Any) -> list[str]:
 
 
 def test_a_table_with_one_leg_longer_shares_only_the_equal_legs() -> None:
-    body = take_apart(robot(*legs(length=0.55)))
+    body = take_apart(robot(*legs(tip="0 0 -0.55")))
     assert [part.likeness for part in body.limbs] == [0, 0, 0, 1]
     assert [part.relation.name for part in body.limbs] == ["itself", "mirror", "shift", "itself"]
 
 
 def test_an_arm_shares_with_no_leg() -> None:
-    model = robot(limb("arm", 0.2, beyond=limb("hand", 0.1)), *legs())
+    model = robot(limb("arm", 0.2, beyond=(limb("hand", 0.1),)), *legs())
     assert classes(model) == {"front_left": 0, "front_right": 0, "arm": 1, "back_left": 0, "back_right": 0}
+
+
+def test_what_branches_belongs_to_the_trunk_on_the_middle_plane_and_stays_one_part_beside_it() -> None:
+    paw = limb("paw", 0.3, 0.2, beyond=(limb("claw_1", 0.1), limb("claw_2", 0.2)))
+    head = limb("head", 0.4, beyond=(limb("ear_left", 0.0, 0.1), limb("ear_right", 0.0, -0.1)))
+    assert classes(robot(paw, head)) == {"ear_left": 0, "ear_right": 0, "paw": 1}
 
 
 @pytest.mark.parametrize(
@@ -187,7 +193,7 @@ def test_only_three_or_more_legs_that_stand_evenly_are_related_by_turns(
     degrees: tuple[float, ...], expected: list[int]
 ) -> None:
     hips = [(angle, 0.2 * math.cos(math.radians(angle)), 0.2 * math.sin(math.radians(angle))) for angle in degrees]
-    model = robot(*(limb(f"at_{angle}", x, y, turned=angle, out=0.4) for angle, x, y in hips))
+    model = robot(*(limb(f"at_{angle}", x, y, turned=angle, tip="0.4 0 -0.5") for angle, x, y in hips))
     assert list(classes(model, symmetry="turn").values()) == expected
 
 
@@ -209,6 +215,7 @@ def test_only_three_or_more_legs_that_stand_evenly_are_related_by_turns(
         ({"axis": "-1 0 0", "control": "-1 0.5"}, None),
         ({"axis": "-1 0 0", "x": 0.01}, (1, 1)),  # a shift along the trunk may go with a mirroring
         ({"axis": "-1 0 0", "y": -0.21}, None),
+        ({"axis": "-1 0 0", "top": "-0.25 0 -0.25", "tip": "0.25 0 -0.25"}, None),
     ],
 )
 def test_legs_mirror_each_other_only_if_ranges_and_motors_agree_after_signs(
@@ -239,7 +246,7 @@ def test_what_lies_about_is_not_taken_for_the_robot() -> None:
 
 
 def test_named_parts_bring_along_what_hangs_on_them_and_leave_the_rest_to_the_trunk() -> None:
-    model = robot(limb("arm", 0.2, beyond=limb("hand", 0.1)), *legs())
+    model = robot(limb("arm", 0.2, beyond=(limb("hand", 0.1),)), *legs())
     body = take_apart(model, parts={"right": ["back_right", "front_right"], "reach": ["arm"]})
     assert {part.name: [model.body(b).name for b in part.relation.bodies] for part in body.limbs} == {
         "right": ["back_right", "front_right"],
@@ -278,7 +285,7 @@ def test_models_that_are_no_robots_are_refused(model: mujoco.MjModel, came: str)
     ],
 )
 def test_parts_that_do_not_fit_the_model_are_refused(parts: dict[str, list[str]], key: str, came: str) -> None:
-    model = robot(limb("arm", 0.2, beyond=limb("hand", 0.1)))
+    model = robot(limb("arm", 0.2, beyond=(limb("hand", 0.1),)))
     with pytest.raises(ConfigError, match=came) as refusal:
         take_apart(model, parts=parts)
     assert refusal.value.key == key

@@ -254,13 +254,15 @@ def test_a_relabelled_robot_senses_the_same_acts_the_same_and_moves_the_same(
     assert strongest > 0.3
 
 
-HUMANOIDS = Robot("humanoid"), Robot("humanoid")
+@pytest.fixture(scope="module")
+def humanoids() -> tuple[Robot, Robot]:
+    return Robot("humanoid"), Robot("humanoid")
 
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_mirrored_humanoid_senses_and_acts_the_same(seed: int) -> None:
-    one, other = HUMANOIDS
+def test_a_mirrored_humanoid_senses_and_acts_the_same(humanoids: tuple[Robot, Robot], seed: int) -> None:
+    one, other = humanoids
     start = any_state(one.model, seed, 1.3)
     one.start(*start)
     other.start(*relabelled(one.model, HUMANOID_MIRROR, *start))
