@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from exneat_cli.tasks import FAILED, Part, RobotTask
+from exneat_cli.tasks import FAILED, RobotTask
+from exneat_cli.wiring import LINKAGES
 
 BAR = 1e-9
 STEPS = 20
@@ -119,7 +120,7 @@ def dog(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 class Robot:
-    """A robot with one network for all parts of the same size, which sees sensors, trunk and all other parts' joints.
+    """A robot with one network for all parts of the same size, wired by ``linkage=joints`` and ``trunk=shared``.
 
     A part on the middle plane has no partner, so it gets no torque.
     """
@@ -152,9 +153,10 @@ class Robot:
     def act(self) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
         """What each part's network is told, and the action that follows."""
         sensed, told, action = self.sense(self.read()), {}, np.zeros(self.model.nu)
-        for part in self.task.parts:
-            peers = [p.mirrored_joints if part.is_mirrored else p.joints for p in others(self.task.parts, part)]
-            told[part.name] = sensed[[*part.sensors, *part.trunk, *(entry for peer in peers for entry in peer)]]
+        outputs = [len(part.actuators) for part in self.task.parts]
+        for own, part in enumerate(self.task.parts):
+            peers = [pin.index for pin in LINKAGES["joints"](self.task.parts, own, outputs, 0)]
+            told[part.name] = sensed[[*part.sensors, *part.trunk, *peers]]
             if abs(part.position[1]) > 1e-6:
                 shape = len(part.actuators), told[part.name].size
                 weights = np.random.default_rng(shape).normal(0.0, 0.03, shape)
@@ -168,16 +170,6 @@ class Robot:
         joints = [self.model.joint(joint).name for joint in self.model.actuator_trnid[:, 0]]
         span = self.model.actuator_ctrlrange[:, 1]
         return dict(zip(joints, self.model.actuator_gear[:, 0] * span * action, strict=True))
-
-
-def others(parts: tuple[Part, ...], own: Part) -> list[Part]:
-    """Counter-clockwise from a part, clockwise from a mirrored one."""
-
-    def angle(part: Part) -> float:
-        along = math.atan2(part.position[1], part.position[0]) - math.atan2(own.position[1], own.position[0])
-        return (-along if own.is_mirrored else along) % (2.0 * math.pi)
-
-    return sorted((part for part in parts if part is not own), key=angle)
 
 
 def relabelled(
