@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brains, acting_by_rule
-from exneat_cli.errors import ConfigError, ExneatError, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_section, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.tasks import TASKS
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
@@ -31,7 +32,11 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         fix = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
-        settings = RunSettings.from_plain(read_yaml(directory.config))
+        plain = dict(read_yaml(directory.config))
+        task = TASKS.get(str(check_section("task", plain.get("task")).get("name")))
+        if task is not None:
+            plain["task"] = task.found_in(plain["task"], directory.model)
+        settings = RunSettings.from_plain(plain)
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
     if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):

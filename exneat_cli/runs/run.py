@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 import yaml
 
@@ -60,6 +61,8 @@ def train(
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
     resume = settings.resume or go_on
+    if resume and not directory.is_there():
+        _refuse_changed_files(settings, asked)
     with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=settings.resume) as was_done:
         if not was_done:
             with _recorded(directory, settings, progress, command):
@@ -77,6 +80,16 @@ def train(
                 directory.update_manifest(status=DONE, finished=_now(), result=result)
         result = directory.read_result()
     return Finished(directory, result, summary_sentence(settings.task, result), trained_now=not was_done)
+
+
+def _refuse_changed_files(settings: RunSettings, asked: Mapping[str, Any]) -> None:
+    """Refuse to begin anew what was to be resumed, because a file that the task is made of has changed since."""
+    directory = settings.directory.path
+    name = f"{settings.variant}-s{settings.seed}-"
+    for path in sorted(directory.parent.glob(f"{name}*")) if settings.task.files() else ():
+        if RunDirectory(path).is_alike(asked):
+            fix = f"use the copy in {path / 'model'}, or leave resume=true out for a new run"
+            raise ExneatError(f"{path}: began with other files of the task than there are now\n  {fix}")
 
 
 def _save(directory: RunDirectory, training: Training) -> None:
@@ -99,7 +112,7 @@ def _recorded(
         _tell_other_versions(before, progress)
         directory.forget_what_was_derived()
     try:
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest, settings.task.files())
         progress.start(directory.path.name, settings.generations)
         yield
     except (Exception, KeyboardInterrupt) as error:

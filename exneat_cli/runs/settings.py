@@ -157,9 +157,18 @@ class RunSettings:
         Raises:
             ConfigError: a key is unknown, or a value has the wrong type or range.
         """
-        task = _chosen(TASKS, "task", plain.get("task"))
+        task = read_task(plain.get("task"))
         algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
         return build(cls, {**plain, "task": task, "algorithm": algorithm})
+
+
+def read_task(section: object) -> Task:
+    """A task from plain data, by the ``name`` in it.
+
+    Raises:
+        ConfigError: there is no such task, or it cannot be made of these parameters.
+    """
+    return _chosen(TASKS, "task", section)
 
 
 def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -141,9 +142,27 @@ class Task(ABC):
         """The parameters that make two tasks the same, as plain data for a run's hash."""
         return asdict(self)  # type: ignore[call-overload, no-any-return]
 
+    def files(self) -> dict[str, bytes]:
+        """Contents of the files that the task is made of, which a run keeps, by their relative paths."""
+        return {}
+
+    @classmethod
+    def found_in(cls, section: Mapping[str, Any], directory: Path) -> dict[str, Any]:
+        """Parameters as a run recorded them, reading `files` where it keeps them."""
+        return dict(section)
+
     def shared_by(self, subpopulations: Sequence[int]) -> Task:
         """The task once it is known which subpopulation each part belongs to, (parts,)."""
         return self
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """What is sensed, entry by entry, with its unit if it has one."""
+        return tuple(f"sensor {entry}" for entry in range(self.sensed_size))
+
+    def remarks_on(self, part: Part) -> dict[str, str]:
+        """What else there is to say of a part, by a word."""
+        return {}
 
     @property
     def whole(self) -> tuple[int, ...]:

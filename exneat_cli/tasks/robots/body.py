@@ -124,15 +124,30 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
     found = []
     for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
         joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and j not in driven]
-        kinds = sorted(mujoco.mjtJoint(model.jnt_type[j]).name for j in joints)
-        if kinds in (["mjJNT_FREE"], ["mjJNT_HINGE", "mjJNT_SLIDE", "mjJNT_SLIDE"]):
+        if _is_free(model, joints) or _is_planar(model, body, joints):
             bodies = subtree(model, body)
             found.append((sum(model.jnt_bodyid[j] in bodies for j in driven), body, tuple(joints)))
     if not found or max(found)[0] == 0:
-        fix = "give its trunk a <freejoint/>, or two slides and a hinge without actuators"
+        fix = "give its trunk a <freejoint/>; or two slides along the world's axes and then a hinge at its origin"
         raise ConfigError("task.model", "a body that moves freely or in a plane and has actuators", "none", fix)
     _, trunk, root = max(found, key=lambda each: each[0])
     return trunk, root
+
+
+def _is_free(model: mujoco.MjModel, joints: Sequence[int]) -> bool:
+    return [int(model.jnt_type[j]) for j in joints] == [int(mujoco.mjtJoint.mjJNT_FREE)]
+
+
+def _is_planar(model: mujoco.MjModel, body: int, joints: Sequence[int]) -> bool:
+    """Whether they are two slides and a hinge that MuJoCo measures in the world's axes and from an upright trunk."""
+    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    if [int(model.jnt_type[j]) for j in joints] != [slide, slide, hinge]:
+        return False
+    about = joints[2]
+    axes = model.jnt_axis[list(joints)]
+    in_line = np.all(np.isclose(np.abs(axes).max(axis=1), 1.0)) and np.all(axes[:2].sum(axis=1) > 0.0)
+    upright = np.allclose(model.body_quat[body], [1.0, 0.0, 0.0, 0.0]) and model.qpos0[model.jnt_qposadr[about]] == 0.0
+    return bool(in_line and upright and np.allclose(model.jnt_pos[about], 0.0))
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:

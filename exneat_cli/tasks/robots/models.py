@@ -8,6 +8,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -16,7 +18,7 @@ import mujoco
 
 from exneat_cli.errors import ConfigError
 
-LARGEST_FILE = 64 * 2**20
+LARGEST = 64 * 2**20
 """Bytes that a model and the files it includes may have together."""
 
 
@@ -126,31 +128,36 @@ def path_of(model: str) -> Path:
 
 @functools.cache
 def files_of(model: str) -> dict[str, bytes]:
-    """The model's file and all that it includes, by their paths below a common directory; the model's comes first.
+    """The model's file and all that it includes, by their paths below the directory that holds them all.
 
     Raises:
-        ConfigError: one of them is missing, cannot be read, or they are too large.
+        ConfigError: one of them is missing, cannot be read, is no MJCF, or they are too large.
     """
-    main = path_of(model)
-    if main.stat().st_size > LARGEST_FILE:
-        raise ConfigError("task.model", f"a model of at most {LARGEST_FILE >> 20} MB", f"{main}, which is larger")
+    main = path_of(model).resolve()
     try:
-        paths = [main, *(Path(name) for name in mujoco.mju_getXMLDependencies(str(main)) if Path(name) != main)]
-        if sum(path.stat().st_size for path in paths) > LARGEST_FILE:
-            raise ConfigError("task.model", f"a model of at most {LARGEST_FILE >> 20} MB", f"{main} with its files")
-        return {str(path): path.read_bytes() for path in paths}
+        _refuse_large([main])
+        paths = [main, *(Path(os.path.normpath(name)) for name in mujoco.mju_getXMLDependencies(str(main)))]
+        _refuse_large(paths)
+        common = Path(os.path.commonpath([path.parent for path in paths]))
+        return {str(path.relative_to(common)): path.read_bytes() for path in sorted(set(paths))}
     except OSError as error:
-        raise ConfigError(
-            "task.model", "a model whose files can be read", f"{error.filename}: {error.strerror}"
-        ) from None
+        came = f"{error.filename}: {error.strerror}"
+        raise ConfigError("task.model", "a model whose files can all be read", came) from error
+    except mujoco.FatalError as error:
+        raise ConfigError("task.model", "an MJCF file", f"{main.name}: {error}") from error
+
+
+def _refuse_large(paths: Iterable[Path]) -> None:
+    if sum(path.stat().st_size for path in paths) > LARGEST:
+        raise ConfigError("task.model", f"files of at most {LARGEST >> 20} MB together", "larger ones")
 
 
 @functools.cache
 def digest_of(model: str) -> str:
-    """SHA-256 of the model's files."""
+    """SHA-256 of the model's files and their names."""
     digest = hashlib.sha256()
     for name, content in files_of(model).items():
-        digest.update(f"{Path(name).name} {len(content)}\n".encode() + content)
+        digest.update(f"{name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
@@ -161,7 +168,10 @@ def load(model: str) -> mujoco.MjModel:
     Raises:
         ConfigError: it is no MJCF, or MuJoCo refuses it.
     """
+    files_of(model)
+    mujoco.set_mju_user_warning(lambda message: None)  # else MuJoCo writes MUJOCO_LOG.TXT
     try:
         return mujoco.MjModel.from_xml_path(str(path_of(model)))
     except ValueError as error:
-        raise ConfigError("task.model", "an MJCF file that MuJoCo can load", f"{model}: {error}") from None
+        reason = " ".join(str(error).split())
+        raise ConfigError("task.model", "an MJCF file that MuJoCo can load", f"{model}: {reason}") from error

@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import mujoco
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
 from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
-from exneat_cli.tasks.robots.models import digest_of, load, rules_of
+from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, read_off
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
 from exneat_cli.tasks.task import Part, Simulation, Task
@@ -112,6 +113,22 @@ class RobotTask(Task):
         sensing = self._anatomy[2]
         return tuple(f"{name} ({unit})" for name, unit in zip(sensing.names, sensing.units, strict=True))
 
+    def remarks_on(self, part: Part) -> dict[str, str]:
+        """Its bodies, which part it is alike, and its joints with the signs that it senses them with."""
+        model, (body, _, _) = load(self.model), self._anatomy
+        if part == self.trunk:
+            return {"bodies": ", ".join(model.body(each).name for each in body.core)}
+        limb = body.limbs[self.parts.index(part)]
+        first = next(each for each in body.limbs if each.likeness == limb.likeness)
+        relation = limb.relation
+        signed = zip(relation.joints, relation.joint_signs, strict=True)
+        like = "" if limb is first else f": a {relation.name} of {first.name}"
+        return {
+            "bodies": ", ".join(model.body(each).name for each in relation.bodies),
+            "class": f"{limb.likeness}{like}",
+            "joints": ", ".join(f"{'+-'[sign < 0]}{model.joint(joint).name}" for joint, sign in signed),
+        }
+
     @property
     def observation_size(self) -> int:
         """Number of readings."""
@@ -141,6 +158,16 @@ class RobotTask(Task):
     def identity(self) -> dict[str, Any]:
         """The parameters, with the model by its content."""
         return {**asdict(self), "model": digest_of(self.model)}
+
+    def files(self) -> dict[str, bytes]:
+        """The model's files, unless it has a name."""
+        return {} if self.model in NAMED else files_of(self.model)
+
+    @classmethod
+    def found_in(cls, section: Mapping[str, Any], directory: Path) -> dict[str, Any]:
+        """Parameters as a run recorded them, with the model that it keeps in `directory`."""
+        kept = sorted(directory.rglob(Path(str(section.get("model"))).name)) if directory.is_dir() else []
+        return {**section, "model": str(kept[0])} if kept else dict(section)
 
     def shared_by(self, subpopulations: Sequence[int]) -> RobotTask:
         """With `symmetry` decided: turns if some sharers are alike by nothing else, else mirrorings."""
