@@ -40,12 +40,12 @@ def _show_task(task: Task) -> None:
     print(f"task {task.name}: {task.sensed_size} sensors, {len(task.actuator_names)} actuators\n")
     for part in (*task.parts, *filter(None, [task.trunk])):
         x, y = part.position
-        print(f"{part.name}  at ({x:+.3g}, {y:+.3g}, {part.height:+.3g})")
+        print(f"{part.name}  at ({x:+.2f}, {y:+.2f}, {part.height:+.2f})")
         drives = ", ".join(task.actuator_names[actuator] for actuator in part.actuators)
         remarks = {**task.remarks_on(part), "drives": drives or "nothing itself"}
         remarks["senses"] = ", ".join(task.sensor_names[entry] for entry in part.sensors)
         if part.trunk:
-            remarks["trunk"] = ", ".join(task.sensor_names[entry] for entry in part.trunk)
+            remarks["trunk"] = f"{len(part.trunk)} entries as seen from here, for wiring.trunk=shared"
         for word, text in remarks.items():
             print(textwrap.fill(text, 110, initial_indent=f"  {word:<8} ", subsequent_indent=" " * 11))
         print()

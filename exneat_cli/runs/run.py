@@ -114,6 +114,10 @@ def _recorded(
     try:
         directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest, settings.task.files())
         progress.start(directory.path.name, settings.generations)
+        if settings.geometry.name == "auto" and settings.algorithm.modular:
+            vector = settings.geometry.subpopulations(settings.task.parts)
+            parts = zip(settings.task.parts, vector, strict=True)
+            progress.say(f"geometry=auto shares by likeness: {', '.join(f'{part.name} {n}' for part, n in parts)}")
         yield
     except (Exception, KeyboardInterrupt) as error:
         _mark_unfinished(directory, error)

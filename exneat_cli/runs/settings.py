@@ -90,7 +90,7 @@ class RunSettings:
 
     def _settle(self) -> None:
         """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
-        own = self.task.reset_scale if isinstance(self.task, HasInitialPose) else None
+        own = self.task.usual_reset_scale() if isinstance(self.task, HasInitialPose) else None
         if own is None and self.noise.reset_scale not in (None, _NO_POSE):
             fix = f"task={self.task.name} has no initial pose that noise could disturb"
             raise ConfigError("noise.reset_scale", "null, its default", self.noise.reset_scale, fix)

@@ -197,8 +197,7 @@ class HasTiles(Protocol):
 class HasInitialPose(Protocol):
     """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
 
-    @property
-    def reset_scale(self) -> float:
+    def usual_reset_scale(self) -> float:
         """The size of this noise unless told otherwise."""
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:

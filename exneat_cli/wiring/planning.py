@@ -14,9 +14,11 @@ from exneat_cli.tasks import Part, Task
 from exneat_cli.wiring.linkage import LINKAGES
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan
 
-BY_POSITION = ("fb", "lr", "cross")
-"""Geometries that follow from where the parts stand: front and back, left and right, opposite each other."""
-GEOMETRIES = ("single", *BY_POSITION, "auto", "all", "custom")
+PRINTED_VECTORS = {"fb": (0, 0, 1, 1), "lr": (0, 1, 0, 1), "cross": (0, 1, 1, 0)}
+"""Geometries that follow from where parts stand: front and back, left and right, opposite each other. For Ant's legs,
+in whatever order, they are the vectors that the thesis prints."""
+_ANTS_LEGS = {"front_left", "front_right", "back_left", "back_right"}
+GEOMETRIES = ("single", *PRINTED_VECTORS, "auto", "all", "custom")
 TRUNK_MODES = ("none", "shared", "module")
 _ON_THE_LINE = 1e-6
 """Length below which a part stands neither in front nor behind, neither left nor right."""
@@ -63,8 +65,9 @@ class Geometry:
             return (0,) * len(parts)
         if self.name == "all":
             return tuple(range(len(parts)))
-        if self.name in BY_POSITION:
-            return _by_position(self.name, parts)
+        if self.name in PRINTED_VECTORS:
+            ants = {part.name for part in parts} == _ANTS_LEGS
+            return PRINTED_VECTORS[self.name] if ants else _by_position(self.name, parts)
         if self.name == "auto":
             if any(part.likeness < 0 for part in parts):
                 raise ConfigError("geometry", "single, all or custom", "auto", f"nobody compared these parts: {names}")
@@ -82,7 +85,7 @@ def _numbered(groups: Sequence[Hashable]) -> tuple[int, ...]:
 
 
 def _by_position(name: str, parts: Sequence[Part]) -> tuple[int, ...]:
-    """The vector of a geometry in `BY_POSITION`, for parts that stand accordingly."""
+    """The vector of a geometry in `PRINTED_VECTORS`, for parts that stand accordingly."""
     if name == "cross":
         across = [[p for p, other in enumerate(parts) if _are_opposite(part, other)] for part in parts]
         if all(len(others) == 1 for others in across):

@@ -46,7 +46,7 @@ def test_every_actuator_is_driven_once_with_and_without_a_central_module() -> No
     assert sorted(a for module in ant_plan(central=False).modules for a in module.drives) == list(range(8))
 
 
-def test_peers_come_peers_of_from_the_own_leg() -> None:
+def test_peers_come_counter_clockwise_from_the_own_leg() -> None:
     legs = AntTask().parts
     for own, leg in enumerate(legs):
         start = AROUND.index(leg.name)
@@ -207,7 +207,7 @@ def test_single_and_all_fit_any_number_of_parts(count: int) -> None:
 
 @pytest.mark.parametrize("name", ["fb", "lr", "cross"])
 def test_leg_geometries_are_refused_without_legs(name: str) -> None:
-    with pytest.raises(ConfigError, match="geometry: expected single, all or custom"):
+    with pytest.raises(ConfigError, match=f"geometry: expected parts that all stand .* for {name}, got"):
         Geometry(name).subpopulations(parts(4))
 
 

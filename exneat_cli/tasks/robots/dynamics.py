@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
 from exneat_cli.errors import ExneatError
-from exneat_cli.tasks.robots import frames
-from exneat_cli.tasks.robots.frames import Frames
+from exneat_cli.tasks.robots.frames import Frames, sense_in_frames
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 
 _SYMBOLS = ("mj_step", "mj_forward", "mj_resetData", "mj_rnePostConstraint")
@@ -159,7 +158,7 @@ def observe(world: RobotWorld, observation: NDArray[np.float64]) -> None:
 @compiled
 def sense(world: RobotWorld, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
     """Write what the parts sense in their own frames."""
-    frames.sense(world.frames, readings, sensed)
+    sense_in_frames(world.frames, readings, sensed)
 
 
 @compiled

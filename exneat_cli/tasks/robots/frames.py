@@ -52,7 +52,7 @@ class Frames(NamedTuple):
 
 
 @compiled
-def sense(frames: Frames, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
+def sense_in_frames(frames: Frames, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
     """Write what all parts sense in their own frames."""
     for k in range(frames.scalar_from.size):
         sensed[frames.scalar_to[k]] = frames.scalar_sign[k] * readings[frames.scalar_from[k]]

@@ -115,10 +115,8 @@ def path_of(model: str) -> Path:
     Raises:
         ConfigError: there is no such file.
     """
-    if model == "hexapod":
-        return Path(str(resources.files(__package__) / "hexapod.xml"))
     if model in NAMED:
-        return Path(str(resources.files("gymnasium") / "envs" / "mujoco" / "assets" / NAMED[model][0]))
+        return _shipped(model)
     path = Path(model).expanduser()
     if not path.is_file():
         fix = f"or one of the names {', '.join(NAMED)}"
@@ -127,13 +125,31 @@ def path_of(model: str) -> Path:
 
 
 @functools.cache
+def _shipped(model: str) -> Path:
+    ours = resources.files(__package__)
+    return Path(
+        str((ours if model == "hexapod" else resources.files("gymnasium.envs.mujoco.assets")) / NAMED[model][0])
+    )
+
+
+def _state(model: str) -> tuple[Path, int, int]:
+    """What tells one content of a model's file from another: a program may run for long, and files change."""
+    path = path_of(model).resolve()
+    found = path.stat()
+    return path, found.st_mtime_ns, found.st_size
+
+
 def files_of(model: str) -> dict[str, bytes]:
     """The model's file and all that it includes, by their paths below the directory that holds them all.
 
     Raises:
         ConfigError: one of them is missing, cannot be read, is no MJCF, or they are too large.
     """
-    main = path_of(model).resolve()
+    return _files(*_state(model))
+
+
+@functools.lru_cache(maxsize=16)
+def _files(main: Path, *_: int) -> dict[str, bytes]:
     try:
         _refuse_large([main])
         paths = [main, *(Path(os.path.normpath(name)) for name in mujoco.mju_getXMLDependencies(str(main)))]
@@ -152,7 +168,6 @@ def _refuse_large(paths: Iterable[Path]) -> None:
         raise ConfigError("task.model", f"files of at most {LARGEST >> 20} MB together", "larger ones")
 
 
-@functools.cache
 def digest_of(model: str) -> str:
     """SHA-256 of the model's files and their names."""
     digest = hashlib.sha256()
@@ -161,17 +176,21 @@ def digest_of(model: str) -> str:
     return digest.hexdigest()
 
 
-@functools.cache
 def load(model: str) -> mujoco.MjModel:
-    """The compiled model.
+    """The compiled model, the same object as long as its file does not change.
 
     Raises:
-        ConfigError: it is no MJCF, or MuJoCo refuses it.
+        ConfigError: its files cannot be used, see `files_of`, or MuJoCo refuses them.
     """
-    files_of(model)
+    return _load(*_state(model))
+
+
+@functools.lru_cache(maxsize=16)
+def _load(path: Path, *state: int) -> mujoco.MjModel:
+    _files(path, *state)
     mujoco.set_mju_user_warning(lambda message: None)  # else MuJoCo writes MUJOCO_LOG.TXT
     try:
-        return mujoco.MjModel.from_xml_path(str(path_of(model)))
+        return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
-        raise ConfigError("task.model", "an MJCF file that MuJoCo can load", f"{model}: {reason}") from error
+        raise ConfigError("task.model", "an MJCF file that MuJoCo can load", f"{path.name}: {reason}") from error

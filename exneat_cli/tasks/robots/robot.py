@@ -104,6 +104,8 @@ class RobotTask(Task):
     @property
     def whole(self) -> tuple[int, ...]:
         """Entries that a single network senses: of all parts and of the trunk, each once."""
+        if self.frame == "world":
+            return super().whole
         own = {entry for part in (*self.parts, self.trunk) for entry in part.sensors}
         return tuple(sorted(own))
 
@@ -150,8 +152,7 @@ class RobotTask(Task):
         """`max_steps`."""
         return self.max_steps
 
-    @property
-    def reset_scale(self) -> float:
+    def usual_reset_scale(self) -> float:
         """Noise on the initial pose as the model's rules have it."""
         return rules_of(self.model).reset_scale
 
@@ -188,7 +189,7 @@ class RobotTask(Task):
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new world with the model's own noise on the initial pose."""
-        return self.open_disturbed(training=training, reset_scale=self.reset_scale)
+        return self.open_disturbed(training=training, reset_scale=self.usual_reset_scale())
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
@@ -279,22 +280,25 @@ class RobotTask(Task):
     @property
     def _anatomy(self) -> tuple[Body, Readings, Sensing]:
         named = tuple((name, tuple(bodies)) for name, bodies in (self.part_bodies or {}).items())
-        return _anatomy(self.model, self.part_order, self.symmetry, named, self.frame, self.contact_forces)
+        by_place = rules_of(self.model).named_by_place
+        return _anatomy(
+            load(self.model), by_place, self.part_order, self.symmetry, named, self.frame, self.contact_forces
+        )
 
 
-@functools.cache
+@functools.lru_cache(maxsize=64)
 def _anatomy(
-    model: str,
+    model: mujoco.MjModel,
+    by_place: bool,
     order: str,
     symmetry: str | None,
     named: tuple[tuple[str, tuple[str, ...]], ...],
     frame: str,
     contact_forces: bool,
 ) -> tuple[Body, Readings, Sensing]:
-    loaded, by_place = load(model), rules_of(model).named_by_place
-    body = take_apart(loaded, order=order, symmetry=symmetry, parts=dict(named), by_place=by_place)
-    readings = read_off(loaded, body, contact_forces=contact_forces)
-    return body, readings, (in_the_world if frame == "world" else in_own_frames)(loaded, body, readings)
+    body = take_apart(model, order=order, symmetry=symmetry, parts=dict(named), by_place=by_place)
+    readings = read_off(model, body, contact_forces=contact_forces)
+    return body, readings, (in_the_world if frame == "world" else in_own_frames)(model, body, readings)
 
 
 @dataclass(frozen=True)

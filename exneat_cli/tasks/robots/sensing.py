@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import mujoco
@@ -47,7 +48,8 @@ def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensi
     parts = []
     for limb in body.limbs:
         joints, forces = entries(limb.relation.joints, limb.relation.bodies)
-        parts.append(_part(limb, (*joints, *forces), joints, joints, trunk.sensors))
+        part = _part(limb, (*joints, *forces), joints, joints, trunk.sensors)
+        parts.append(replace(part, is_mirrored=False))
     nothing = np.full((1, len(VIEW)), -1, np.int64)
     frames = _frames(model, body, readings, _Layout(model, readings), np.eye(3)[None], nothing)
     return Sensing(readings.names, readings.units, tuple(parts), trunk, frames)
