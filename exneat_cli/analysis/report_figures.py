@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from exneat_cli.analysis.captions import budget_sentence, few_runs_sentence, spent_in
 from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
-from exneat_cli.analysis.network_data import read_champion_graph
-from exneat_cli.analysis.network_graph import champions_figure
+from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.panels import AXIS_LABELS, draw_panel
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study
 from exneat_cli.analysis.styles import save_figure, style
@@ -66,17 +65,17 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
 
 def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Figure, list[str]]:
     """Of each panel's variant the champion of the run that was best on validation, side by side."""
-    graphs, titles, sentences = [], [], []
+    champions, titles, sentences = [], [], []
     for panel in plan.panels:
         study, variant = studies[panel.experiment], str(panel.variant)
         study.require(panel.condition, [variant])
         ranked = study.best_first(panel.condition, variant)
-        graphs.append(read_champion_graph(ranked[0].directory))
+        champions.append(champion_of(ranked[0].directory))
         titles.append(f"{study.variants[variant]}, {study.conditions[panel.condition]}")
         chosen = f"best on validation of {len(ranked)} runs" if len(ranked) > 1 else "the only run"
-        score = f"test {study.fitness_name} {graphs[-1].test_fitness:.4g}"
+        score = f"test {study.fitness_name} {champions[-1].scores.test.fitness_mean:.4g}"
         sentences.append(f"{titles[-1]}: seed {ranked[0].seed}, {chosen}, budget {study.budget}, {score}.")
-    return champions_figure(plan.title, graphs, titles), [*sentences, "Disabled connections are left out."]
+    return champions_figure(plan.title, champions, titles), [*sentences, "Disabled connections are left out."]
 
 
 def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> tuple[Figure, list[str]]:
