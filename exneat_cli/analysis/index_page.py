@@ -29,20 +29,16 @@ _SECTIONS = {
     "Others": ("",),
 }
 """Title -> beginnings of the names of what stands there, in this order."""
-_PICTURES = {".png": "image/png", ".svg": "image/svg+xml"}
 _NUMBER = re.compile(r"[\[<>]?-?\d[^A-Za-z]*")
 
 
 def write_index(
     directory: Path, studies: Mapping[str, Study], artefacts: Sequence[Built], missing: Mapping[str, str]
 ) -> Path:
-    """Write ``index.html``; the same data gives the same bytes.
+    """Write ``index.html`` into `directory`, from where files are linked; the same data gives the same bytes.
 
-    Args:
-        directory: of the report; made if need be. Links to files are relative to it.
-        studies: by the name of their experiment.
-        artefacts: what was built, in the order in which it is to be shown within its section.
-        missing: name of what could not be built -> the text of its `MissingRunsError`.
+    Artefacts are shown in their order within each section. `studies` are by the name of their experiment, `missing`
+    holds the text of the `MissingRunsError` of what could not be built, by its name.
 
     Raises:
         ExneatError: a picture or a manifest cannot be read, or the page cannot be written.
@@ -83,14 +79,13 @@ def _heading(built: Built) -> str:
 
 
 def _picture(paths: Sequence[Path]) -> str:
-    """The address of the first picture, PNG before SVG, with the picture itself inside; nothing if there is none."""
-    for suffix, kind in _PICTURES.items():
-        for path in paths:
-            if path.suffix == suffix:
-                try:
-                    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-                except OSError as error:
-                    raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+    """The address of the PNG, with the picture itself inside; nothing if there is none."""
+    for path in paths:
+        if path.suffix == ".png":
+            try:
+                return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+            except OSError as error:
+                raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
     return ""
 
 
@@ -103,7 +98,7 @@ def _facts(study: Study) -> dict[str, Any]:
         ends = dict.fromkeys((min(seeds, default=""), max(seeds, default="")))
         rows.append((label, str(finished), str(len(seeds)), " to ".join(map(str, ends))))
     versions: dict[str, set[str]] = {}
-    for manifest in study.manifests.values():
+    for manifest in study.finished.values():
         for library, version in manifest.versions.items():
             versions.setdefault(library, set()).add(str(version))
     conditions = study.results["condition"].unique()

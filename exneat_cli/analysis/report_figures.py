@@ -245,8 +245,8 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None
             continue
         _draw_band(axes, table, styles[variant])
         if table.shape[1] > BEST:
-            best = [run.seed for run in study.best_first(panel.condition, variant) if run.seed in table][:BEST]
-            axes.plot(table.index, table[best].mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
+            best = table[study.best_seeds(panel.condition, variant, table.columns)]
+            axes.plot(table.index, best.mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
     if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
     tick_levels(axes, (level for table in tables.values() for level in table.index))

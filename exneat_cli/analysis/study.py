@@ -19,7 +19,8 @@ from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDire
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
-_RESULTS = ("training", "validation", "test", "full_reward", "episodes", "env_steps", "wall_seconds")
+_REACHED = ("training", "validation", "test", "full_reward")
+_SPENT = ("episodes", "env_steps", "wall_seconds")
 
 
 class MissingRunsError(ExneatError):
@@ -93,15 +94,10 @@ class Study:
         return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
 
     @functools.cached_property
-    def manifests(self) -> Mapping[PlannedRun, Manifest]:
-        """The finished runs with their manifests."""
-        finished = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
-        return {run: run.directory.read_manifest() for run in finished}
-
-    @property
-    def finished(self) -> tuple[PlannedRun, ...]:
-        """The runs that are done."""
-        return tuple(self.manifests)
+    def finished(self) -> Mapping[PlannedRun, Manifest]:
+        """The runs that are done, with their manifests."""
+        done = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
+        return {run: run.directory.read_manifest() for run in done}
 
     def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
         """Finished runs of one variant in one condition, in the order of their seeds."""
@@ -130,20 +126,27 @@ class Study:
         baselines have test figures alone.
         """
         rows = []
-        for run, manifest in self.manifests.items():
-            result = manifest.result
+        for run, manifest in self.finished.items():
+            result, spent = manifest.result, manifest.budget_spent
             assert result is not None
-            figures = {"training": result.training, "validation": result.validation}
-            test = {"test": result.champion.fitness_mean, "full_reward": result.champion.full_reward_mean}
-            place = {"condition": run.condition, "variant": run.variant, "seed": run.seed}
-            rows.append({**figures, **manifest.budget_spent, **test, **place})
-        table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_RESULTS])
-        return table.astype(dict.fromkeys(_RESULTS, float))
+            reached = (
+                result.training,
+                result.validation,
+                result.champion.fitness_mean,
+                result.champion.full_reward_mean,
+            )
+            rows.append((run.condition, run.variant, run.seed, *reached, *(spent.get(name) for name in _SPENT)))
+        table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_REACHED, *_SPENT])
+        return table.astype(dict.fromkeys((*_REACHED, *_SPENT), float))
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-        validation = dict(zip(self.manifests, self.results["validation"].fillna(-math.inf), strict=True))
+        validation = dict(zip(self.finished, self.results["validation"].fillna(-math.inf), strict=True))
         return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
+
+    def best_seeds(self, condition: str, variant: str, among: Collection[int]) -> list[int]:
+        """Seeds of the up to `BEST` runs of some seeds that are best on validation."""
+        return [run.seed for run in self.best_first(condition, variant) if run.seed in among][:BEST]
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
@@ -165,13 +168,10 @@ class Study:
             for run in self.finished
             if run.condition == condition
             for row in read_robustness(run.directory.robustness)
-            if self._is_planned(row)
+            if self.levels is None or row.level in self.levels.get(row.parameter, ())
+            if self.sweep_episodes in (None, row.episodes)
         ]
         return pd.DataFrame(rows, columns=[*RobustnessRow._fields, "seed"])
-
-    def _is_planned(self, row: RobustnessRow) -> bool:
-        is_level = self.levels is None or row.level in self.levels.get(row.parameter, ())
-        return is_level and self.sweep_episodes in (None, row.episodes)
 
 
 def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
