@@ -18,10 +18,9 @@ _MEANINGS = {
 
 
 def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
-    """Say what a table rests on and what its columns mean.
+    """Say what a table rests on and what its columns, some of `QUANTITIES`, mean.
 
-    `lines` are those of the study's summary that it shows, maybe with a column ``published``; `quantities` are some of
-    `QUANTITIES`.
+    `lines` are those of the study's summary that it shows, maybe with a column ``published``.
     """
     conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
     is_published = "published" in lines and bool((lines["published"] != "").any())
@@ -65,11 +64,8 @@ def spent_in(study: Study, condition: str, variants: Collection[str]) -> pd.Data
 def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
     """Say whether variants had equal budgets, and how many environment steps each took.
 
-    Episodes are what a budget sets; steps follow from how long a variant's episodes last, so variants with equal
-    budgets differ in them.
-
-    Args:
-        places: one table of `spent_in` for each condition or panel; variants are compared within each.
+    Variants are compared within each of `places`, which are tables of `spent_in`. Episodes are what a budget sets;
+    steps follow from how long a variant's episodes last, so variants with equal budgets differ in them.
     """
     spent = pd.concat(places) if places else pd.DataFrame()
     if spent.empty:

@@ -45,8 +45,6 @@ _WHAT_IS_SHOWN = {
     "robustness": "Lines with markers: mean over all runs; bands: 95% bootstrap interval over runs.",
     "cluster": "One point per run: the mean over its test episodes at that level; bars: mean over runs.",
 }
-_KEY_WIDTH, _LETTER_WIDTH = 0.6, 0.075
-"""Inches that an entry of the legend takes, at least roughly."""
 
 
 def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path, axis: str = "generation") -> Built:
@@ -120,8 +118,8 @@ def _add_legend(figure: Figure, width: float) -> None:
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label), handle)
-    longest = max(len(label) for label in entries)
-    columns = max(1, min(len(entries), int(width / (_KEY_WIDTH + _LETTER_WIDTH * longest))))
+    inches = 0.6 + 0.075 * max(len(label) for label in entries)  # an entry's, roughly: its key and its letters
+    columns = max(1, min(len(entries), int(width / inches)))
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, fontsize=9)
 
 
@@ -180,15 +178,11 @@ def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> 
 def common_curves(history: pd.DataFrame, axis: str) -> pd.DataFrame:
     """Bring the runs of one variant to common places on an axis: all that every run has reached and none has passed.
 
-    Runs spend different numbers of control steps per generation. Between two generations a run keeps the
-    value of the earlier one, which is what it had then.
-
-    Returns:
-        Best fitness so far: at most `MOST_POINTS` rows, one per place, and a column per seed.
+    Runs spend different numbers of control steps per generation. Between two generations a run keeps the value of the
+    earlier one, which is what it had then. The table, of best fitness so far, has at most `MOST_POINTS` rows.
     """
-    best: pd.DataFrame = (
-        history.pivot_table(index=axis, columns="seed", values="best_so_far", aggfunc="last").ffill().dropna()
-    )
+    found = history.pivot_table(index=axis, columns="seed", values="best_so_far", aggfunc="last")
+    best: pd.DataFrame = found.ffill().dropna()
     shortest = history.groupby("seed")[axis].max().min()
     best = best[best.index <= max(shortest, best.index[0])]
     return best.iloc[np.unique(np.linspace(0, len(best) - 1, MOST_POINTS).round().astype(int))]

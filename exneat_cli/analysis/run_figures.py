@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -88,22 +87,18 @@ def draw_path(run: RunDirectory) -> list[Path]:
             figure = Figure(figsize=(7.0, 3.6), layout="constrained")
             axes = figure.add_subplot(title=title)
             if {"x", "y"} <= set(trace.columns):
-                _draw_on_ground(axes, trace)
+                axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
+                points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
+                axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
+                axes.set(xlabel="x, ahead (m)", ylabel="y, left (m)")
+                axes.set_aspect("equal", adjustable="datalim")
+                figure.colorbar(points, ax=axes, label="control step")
             else:
                 for term in trace.columns.drop("step"):
                     axes.plot(trace["step"], trace[term], label=term.replace("_", " "))
                 axes.set(xlabel="control step", ylabel="reward of the step")
             axes.legend(loc="best")
     return styles.save_figure(figure, run.plots / "path")
-
-
-def _draw_on_ground(axes: Axes, trace: pd.DataFrame) -> None:
-    axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
-    points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
-    axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
-    axes.set(xlabel="x, ahead (m)", ylabel="y, left (m)")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.get_figure().colorbar(points, ax=axes, label="control step")
 
 
 def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:

@@ -50,24 +50,20 @@ def bootstrap_interval(values: Values) -> tuple[float, float]:
     lowest, highest = float(runs[0]), float(runs[-1])
     if highest - lowest <= 1e-12 * max(abs(lowest), abs(highest)):
         return lowest, highest
+    z = math.sqrt(len(runs) / (len(runs) - 1)) * stats.t.isf((1.0 - CONFIDENCE) / 2.0, len(runs) - 1)
+    # Two runs ask for a level that rounds to 1, where the correction of the bias is 0 times infinity.
+    level = min(float(1.0 - 2.0 * stats.norm.sf(z)), 1.0 - 1e-6)
     # Between 0 and 1, so that cubes of tiny or huge values neither vanish nor overflow.
     unit = stats.bootstrap(
         ((runs - lowest) / (highest - lowest),),
         np.mean,
         n_resamples=RESAMPLES,
-        confidence_level=_widened_level(len(runs)),
+        confidence_level=level,
         method="BCa",
         rng=generator(stream(SHARED_ROOT, "bootstrap")),
     ).confidence_interval
     low, high = (lowest + float(end) * (highest - lowest) for end in (unit.low, unit.high))
     return max(lowest, low), min(highest, high)
-
-
-def _widened_level(runs: int) -> float:
-    tail = (1.0 - CONFIDENCE) / 2.0
-    z = math.sqrt(runs / (runs - 1)) * stats.t.isf(tail, runs - 1)
-    # Two runs ask for a level that rounds to 1, where the correction of the bias is 0 times infinity.
-    return min(float(1.0 - 2.0 * stats.norm.sf(z)), 1.0 - 1e-6)
 
 
 def mann_whitney_p(one: Values, other: Values) -> float:

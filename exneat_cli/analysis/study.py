@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -144,8 +145,8 @@ class Study:
         validation = dict(zip(self.finished, self.results["validation"].fillna(-math.inf), strict=True))
         return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
 
-    def best_seeds(self, condition: str, variant: str, among: Collection[int]) -> list[int]:
-        """Seeds of the up to `BEST` runs of some seeds that are best on validation."""
+    def best_seeds(self, condition: str, variant: str, among: Collection[Any]) -> list[int]:
+        """Seeds of the `BEST` runs that are best on validation, or of fewer, of those whose seeds are in `among`."""
         return [run.seed for run in self.best_first(condition, variant) if run.seed in among][:BEST]
 
     def history(self, condition: str) -> pd.DataFrame:

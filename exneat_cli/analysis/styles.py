@@ -101,10 +101,11 @@ def save_figure(figure: Figure, path: Path) -> list[Path]:
         ExneatError: they cannot be written.
     """
     make_directory(path.parent)
-    written = [path.with_name(f"{path.name}.{kind}") for kind in _METADATA]
-    for target, (kind, metadata) in zip(written, _METADATA.items(), strict=True):
+    written = []
+    for kind, metadata in _METADATA.items():
         buffer = io.BytesIO()
         with style():
             figure.savefig(buffer, format=kind, metadata=metadata, dpi=150)
-        write_whole(target, buffer.getvalue())
+        written.append(path.with_name(f"{path.name}.{kind}"))
+        write_whole(written[-1], buffer.getvalue())
     return written

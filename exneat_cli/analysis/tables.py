@@ -157,13 +157,12 @@ def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFra
     make_directory(directory)
     paths = directory / f"{words.name}.csv", directory / f"{words.name}.md"
     write_whole(paths[0], exact.to_csv(index=False, lineterminator="\n"))
-    lines = [f"# {words.name}: {words.title}", "", *map(_line, (header, ["---"] * len(header), *rows))]
-    write_whole(paths[1], "\n".join([*lines, "", words.caption, ""]))
+    lines = [
+        "| " + " | ".join(" ".join(text.split()).replace("|", "\\|") for text in texts) + " |"
+        for texts in (header, ["---"] * len(header), *rows)
+    ]
+    write_whole(paths[1], "\n".join([f"# {words.name}: {words.title}", "", *lines, "", words.caption, ""]))
     return words._replace(paths=paths, header=header, rows=rows)
-
-
-def _line(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"
 
 
 def _summary(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
