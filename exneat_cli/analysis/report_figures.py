@@ -1,11 +1,8 @@
-"""The figures of a report: from an entry of the catalogue and the studies it names to files and a caption.
-
-A panel is drawn from one table per variant: a row per place on the horizontal axis, a column per seed.
-"""
+"""The figures of a report: from an entry of the catalogue and the studies it names to files and a caption."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +22,7 @@ from exneat_cli.analysis.styles import GREY, Look, save_figure, style, tick_leve
 from exneat_cli.errors import ExneatError, check_choice
 
 Tables = dict[str, pd.DataFrame]
+"""Variant -> what its runs reached: a row per place on the horizontal axis, a column per seed."""
 _AXIS_LABELS = {
     "generation": "generation",
     "episodes": "training episodes",
@@ -164,36 +162,39 @@ def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> 
         (_draw_levels if kind == "robustness" else _draw_clusters)(axes, panel, study, tables)
         score = "full reward" if panel.value == "full_reward" else study.fitness_name
         axes.set(xlabel=study.sweeps[str(panel.sweep)], ylabel=score)
-        return {variant: table.shape[1] for variant, table in tables.items()}
-    study.require(panel.condition, study.trained_variants)
-    history = study.history(panel.condition)
-    histories = {variant: history[history["variant"] == variant] for variant in study.trained_variants}
-    if kind == "area":
-        _draw_areas(axes, study, histories)
     else:
-        _draw_curves(axes, study, histories, axis, each_run=kind == "training_runs")
-    return {variant: own["seed"].nunique() for variant, own in histories.items()}
+        study.require(panel.condition, study.trained_variants)
+        tables = _tables(study.history(panel.condition), study.trained_variants, axis, "best_so_far")
+        if kind == "area":
+            _draw_areas(axes, study, tables)
+        else:
+            _draw_curves(axes, study, tables, axis, each_run=kind == "training_runs")
+    return {variant: table.shape[1] for variant, table in tables.items()}
 
 
-def common_curves(history: pd.DataFrame, axis: str) -> pd.DataFrame:
+def _tables(rows: pd.DataFrame, variants: Iterable[str], place: str, score: str) -> Tables:
+    found = {variant: rows[rows["variant"] == variant] for variant in variants}
+    return {v: own.pivot_table(index=place, columns="seed", values=score) for v, own in found.items() if len(own)}
+
+
+def common_curves(curves: pd.DataFrame) -> pd.DataFrame:
     """Bring the runs of one variant to common places on an axis: all that every run has reached and none has passed.
 
     Runs spend different numbers of control steps per generation. Between two generations a run keeps the value of the
-    earlier one, which is what it had then. The table, of best fitness so far, has at most `MOST_POINTS` rows.
+    earlier one, which is what it had then. At most `MOST_POINTS` places are left.
     """
-    found = history.pivot_table(index=axis, columns="seed", values="best_so_far", aggfunc="last")
-    best: pd.DataFrame = found.ffill().dropna()
-    shortest = history.groupby("seed")[axis].max().min()
-    best = best[best.index <= max(shortest, best.index[0])]
-    return best.iloc[np.unique(np.linspace(0, len(best) - 1, MOST_POINTS).round().astype(int))]
+    shortest = min(curves[seed].dropna().index.max() for seed in curves)
+    common: pd.DataFrame = curves.ffill().dropna()
+    common = common[common.index <= max(shortest, common.index[0])]
+    return common.iloc[np.unique(np.linspace(0, len(common) - 1, MOST_POINTS).round().astype(int))]
 
 
-def _draw_curves(axes: Axes, study: Study, histories: Tables, axis: str, *, each_run: bool) -> None:
+def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_run: bool) -> None:
     for variant, look in variant_styles(study.trained_variants).items():
-        curves = common_curves(histories[variant], axis)
+        curves = common_curves(tables[variant])
         if each_run:
-            for _, run in histories[variant].groupby("seed"):
-                axes.plot(run[axis], run["best_so_far"], color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
+            for seed in tables[variant]:
+                axes.plot(tables[variant][seed].dropna(), color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
         else:
             _draw_band(axes, curves, look)
         marks: Look = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
@@ -205,9 +206,9 @@ def _draw_curves(axes: Axes, study: Study, histories: Tables, axis: str, *, each
         axes.xaxis.set_major_formatter(EngFormatter(sep=""))
 
 
-def _draw_areas(axes: Axes, study: Study, histories: Tables) -> None:
+def _draw_areas(axes: Axes, study: Study, tables: Tables) -> None:
     for place, (variant, look) in enumerate(variant_styles(study.trained_variants).items()):
-        areas = histories[variant].groupby("seed")["best_so_far"].mean().to_frame().T
+        areas = tables[variant].mean().to_frame().T
         _draw_points(axes, np.array([place]), areas, look, study.variants[variant], room=0.7, size=40)
     axes.plot([], [], label="bar: mean over runs", **_BAR)
     axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
@@ -220,12 +221,7 @@ def _swept(panel: Panel, study: Study) -> Tables:
     rows = rows[rows["parameter"] == panel.sweep]
     if panel.highest is not None:
         rows = rows[rows["level"] <= panel.highest + 1e-9]
-    score = f"{panel.value}_mean"
-    tables = {
-        variant: rows[rows["variant"] == variant].pivot_table(index="level", columns="seed", values=score)
-        for variant in study.variants
-        if (rows["variant"] == variant).any()
-    }
+    tables = _tables(rows, study.variants, "level", f"{panel.value}_mean")
     if not set(tables) & set(study.trained_variants):
         raise study.lacking(panel.condition, f"no finished sweep of {panel.sweep}")
     return tables

@@ -178,10 +178,13 @@ def test_between_generations_a_run_keeps_its_latest_value_and_none_is_continued_
             "best_so_far": [1.0, 2.0, 3.0, 10.0, 20.0, 30.0],
         }
     )
-    curves = common_curves(history, "env_steps")
-    assert curves.index.tolist() == [15, 20, 25, 30]
-    assert curves.T.to_numpy().tolist() == [[1.0, 2.0, 2.0, 3.0], [10.0, 10.0, 20.0, 20.0]]
-    assert common_curves(history, "generation").index.tolist() == [1, 2, 3]
+    steps, generations = (
+        common_curves(history.pivot_table(index=axis, columns="seed", values="best_so_far"))
+        for axis in ("env_steps", "generation")
+    )
+    assert steps.index.tolist() == [15, 20, 25, 30]
+    assert steps.T.to_numpy().tolist() == [[1.0, 2.0, 2.0, 3.0], [10.0, 10.0, 20.0, 20.0]]
+    assert generations.index.tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize("seeds", [5, 7])
