@@ -15,9 +15,8 @@ from typing import Any
 
 import jinja2
 
-from exneat_cli.analysis.captions import budget_sentence, spent_in
 from exneat_cli.analysis.catalogue import Built
-from exneat_cli.analysis.study import Study
+from exneat_cli.analysis.study import Study, budget_sentence
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import make_directory, write_whole
 
@@ -43,17 +42,14 @@ def write_index(
     Raises:
         ExneatError: a picture or a manifest cannot be read, or the page cannot be written.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("exneat_cli.analysis"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    loader, strict = jinja2.PackageLoader("exneat_cli.analysis"), jinja2.StrictUndefined
+    templates = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
-    environment.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
-    environment.tests["numeric"] = _NUMBER.fullmatch
-    page = environment.get_template("report.html.j2").render(
+    templates.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
+    templates.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
+    templates.tests["numeric"] = _NUMBER.fullmatch
+    page = templates.get_template("report.html.j2").render(
         studies=[(study, _facts(study)) for study in studies.values()],
         sections=_sections(artefacts),
         missing=list(_missing(studies, missing)),
@@ -106,7 +102,7 @@ def _facts(study: Study) -> dict[str, Any]:
         "rows": rows,
         "env_steps": f"{study.results['env_steps'].sum():,.0f}",
         "time": timedelta(seconds=round(study.results["wall_seconds"].sum())),
-        "budgets": budget_sentence([spent_in(study, each, study.trained_variants) for each in conditions]),
+        "budgets": budget_sentence([study.spent_in(each, study.trained_variants) for each in conditions]),
         "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
 

@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
 from numpy.typing import NDArray
 
-from exneat_cli.analysis.captions import budget_sentence, few_runs_sentence, spent_in
 from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
 from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.statistics import bootstrap_interval
-from exneat_cli.analysis.study import BEST, MissingRunsError, Study
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence
 from exneat_cli.analysis.styles import GREY, Look, save_figure, style, tick_levels, variant_styles
 from exneat_cli.errors import ExneatError, check_choice
 
@@ -133,7 +132,7 @@ def _sentences(
         yield f"{place}, number of runs: {listed}."
         learning = [variant for variant in runs if variant in study.trained_variants]
         trained += [runs[variant] for variant in learning]
-        spent.append(spent_in(study, panel.condition, learning))
+        spent.append(study.spent_in(panel.condition, learning))
     yield _WHAT_IS_SHOWN[plan.kind]
     if plan.kind in ("training", "training_runs") and axis != "generation":
         yield "Between generations a run counts with its latest value."

@@ -1,4 +1,4 @@
-"""What a report is made from: the planned runs of experiments, and what their files hold, as tables.
+"""What a report is made from: the planned runs of experiments, what their files hold, and what their training spent.
 
 A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, so
 runs with other settings never slip in, whatever else lies in the same folder.
@@ -20,6 +20,7 @@ from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDire
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
+ENOUGH_RUNS = 10
 _REACHED = ("training", "validation", "test", "full_reward")
 _SPENT = ("episodes", "env_steps", "wall_seconds")
 
@@ -140,6 +141,12 @@ class Study:
         table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_REACHED, *_SPENT])
         return table.astype(dict.fromkeys((*_REACHED, *_SPENT), float))
 
+    def spent_in(self, condition: str, variants: Collection[str]) -> pd.DataFrame:
+        """What training took in one condition: a row per run with the variant's label, episodes and env_steps."""
+        results = self.results[self.results["condition"] == condition]
+        here = results[results["variant"].isin(list(variants))]
+        return here.assign(variant=here["variant"].map(self.variants))[["variant", "episodes", "env_steps"]].dropna()
+
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
         validation = dict(zip(self.finished, self.results["validation"].fillna(-math.inf), strict=True))
@@ -182,8 +189,7 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
         ExneatError: the file is missing or damaged.
     """
     try:
-        with path.open(encoding="utf-8") as file:
-            table = pd.read_csv(file)
+        table = pd.read_csv(path)
     except OSError as error:
         raise ExneatError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
@@ -192,3 +198,38 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
         if column not in table or not pd.api.types.is_numeric_dtype(table[column]):
             raise ExneatError(f"{path}: damaged: expected numbers in a column {column}")
     return table
+
+
+def few_runs_sentence(groups: Iterable[int]) -> str:
+    """Warn if the smallest of the compared groups of runs has fewer than ten; else say nothing."""
+    if min(groups, default=ENOUGH_RUNS) >= ENOUGH_RUNS:
+        return ""
+    return f"Intervals are too narrow below {ENOUGH_RUNS} runs, and a single run has none."
+
+
+def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
+    """Say whether variants had equal budgets, and how many environment steps each took.
+
+    Variants are compared within each of `places`, tables of `Study.spent_in`. Episodes are what a budget sets; steps
+    follow from how long a variant's episodes last, so variants with equal budgets differ in them.
+    """
+    spent = pd.concat(places) if places else pd.DataFrame()
+    if spent.empty:
+        return "No run has spent anything on training."
+    by_variant = spent.groupby("variant", sort=False)
+    compared = [place["episodes"].nunique() for place in places if place["variant"].nunique() > 1]
+    if not compared:
+        verdict = "No two variants have finished runs of the same condition, so there are no budgets to compare"
+    elif max(compared) == 1:
+        verdict = f"All variants had equal budgets of {number_range(spent['episodes'])} training episodes per run"
+    else:
+        each = "; ".join(f"{variant} {number_range(counts)}" for variant, counts in by_variant["episodes"])
+        verdict = f"The variants had unequal budgets of training episodes per run ({each})"
+    means = "; ".join(f"{variant} {steps:,.0f}" for variant, steps in by_variant["env_steps"].mean().items())
+    return f"{verdict}; environment steps per run, on average: {means}."
+
+
+def number_range(counts: Iterable[float]) -> str:
+    """The lowest and the highest as whole numbers, e.g. ``3 to 10``; one number where they are equal."""
+    low, high = min(counts), max(counts)
+    return f"{low:,.0f}" if low == high else f"{low:,.0f} to {high:,.0f}"

@@ -7,16 +7,15 @@ beside what was published; a comparison with the quantities side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
 from exneat_cli.analysis.statistics import compare, efficiency, mean
-from exneat_cli.analysis.study import BEST, MissingRunsError, Study
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence, number_range
 from exneat_cli.errors import check_choice
 from exneat_cli.records import make_directory, write_whole
 
@@ -27,6 +26,12 @@ _SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
 LARGE = 10.0
 """Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
 _PLACE = ["condition", "variant", "quantity", "published"]
+_MEANINGS = {
+    "training": "final best so far",
+    "test": "the champion on test episodes",
+    "robustness": "the champion at one level of a sweep",
+    "full_reward": "on test episodes, with the rewards and costs that training leaves out",
+}
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
@@ -40,7 +45,7 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     of = {column.of for column in plan.columns.values()}
     sentences: list[str] = []
     for experiment, own in lines.groupby("experiment", sort=False):
-        sentences += table_sentences(studies[str(experiment)], own, of)
+        sentences += _sentences(studies[str(experiment)], own, of)
     headings = {name: name for name in _PLACE} | {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM"}
     if "robustness" in of:
         headings["best_5"] = f"ours, best {BEST}"
@@ -107,8 +112,37 @@ def build_comparison(study: Study, directory: Path) -> Built:
     lines = pd.concat([_summary(study, condition, columns) for condition in conditions], ignore_index=True)
     labelled = _labelled(lines, {study.experiment: study})
     name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
-    words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
+    words = Built(name, title, " ".join(filter(None, _sentences(study, lines, columns))), ())
     return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
+
+
+def _sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
+    """What a table rests on and what its columns, some of `QUANTITIES`, mean.
+
+    `lines` are those of the study's summary that it shows, maybe with a column ``published``.
+    """
+    conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
+    is_published = "published" in lines and bool((lines["published"] != "").any())
+    first = study.variants[study.first_variant]
+    counts = {variant: [len(study.of(condition, variant)) for condition in conditions] for variant in variants}
+    # Labels of variants may hold commas.
+    listed = "; ".join(f"{study.variants[variant]} {number_range(runs)}" for variant, runs in counts.items())
+    yield f"Budget {study.budget}; finished runs per condition: {listed}."
+    if is_published and study.budget != "paper":
+        yield "The published figures rest on a larger budget."
+    if meanings := [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]:
+        yield f"{'; '.join(meanings).capitalize()}."
+    if study.fitness_name != "fitness":
+        yield f"Fitness is {study.fitness_name}."
+    yield "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean."
+    yield few_runs_sentence(lines.loc[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0), "runs"])
+    yield f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition."
+    yield f"A12: chance that a run of the variant beats a run of {first}, a tie counting half."
+    if "efficiency" in quantities:
+        reached = "first generation, counted from 1, at which the mean best so far reaches the final mean of"
+        yield f"Efficiency: {reached} {first}."
+        yield "Published efficiencies are not exactly comparable." if is_published else ""
+    yield budget_sentence([study.spent_in(condition, variants) for condition in conditions])
 
 
 def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) -> pd.DataFrame:
