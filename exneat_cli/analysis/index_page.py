@@ -43,13 +43,11 @@ def write_index(
         ExneatError: a picture or a manifest cannot be read, or the page cannot be written.
     """
     loader, strict = jinja2.PackageLoader("exneat_cli.analysis"), jinja2.StrictUndefined
-    templates = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True
-    )
-    templates.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
-    templates.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
-    templates.tests["numeric"] = _NUMBER.fullmatch
-    page = templates.get_template("report.html.j2").render(
+    jinja = jinja2.Environment(loader=loader, undefined=strict, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    jinja.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
+    jinja.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
+    jinja.tests["numeric"] = _NUMBER.fullmatch
+    page = jinja.get_template("report.html.j2").render(
         studies=[(study, _facts(study)) for study in studies.values()],
         sections=_sections(artefacts),
         missing=list(_missing(studies, missing)),

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.study import read_csv
@@ -35,7 +34,7 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
         for column, look in _CURVES.items():
             axes.plot(history["generation"], history[column], **look)
         axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        styles.tick_levels(axes, history["generation"])
         axes.legend(loc="upper left")
     return styles.save_figure(figure, run.plots / "training")
 

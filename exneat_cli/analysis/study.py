@@ -131,12 +131,8 @@ class Study:
         for run, manifest in self.finished.items():
             result, spent = manifest.result, manifest.budget_spent
             assert result is not None
-            reached = (
-                result.training,
-                result.validation,
-                result.champion.fitness_mean,
-                result.champion.full_reward_mean,
-            )
+            test = result.champion
+            reached = (result.training, result.validation, test.fitness_mean, test.full_reward_mean)
             rows.append((run.condition, run.variant, run.seed, *reached, *(spent.get(name) for name in _SPENT)))
         table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_REACHED, *_SPENT])
         return table.astype(dict.fromkeys((*_REACHED, *_SPENT), float))
