@@ -185,7 +185,8 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
         ExneatError: the file is missing or damaged.
     """
     try:
-        table = pd.read_csv(path)
+        with path.open(encoding="utf-8") as file:
+            table = pd.read_csv(file)
     except OSError as error:
         raise ExneatError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
