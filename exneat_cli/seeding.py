@@ -8,7 +8,7 @@ episodes grow from a constant instead of the run's seed: every run and every var
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from numpy.random import PCG64, Generator, SeedSequence
 
@@ -29,8 +29,12 @@ SHARED_ROOT = 0
 """Root of the validation and test streams, which do not depend on the run's seed."""
 
 
-EpisodeSeeds = tuple[SeedSequence, SeedSequence, SeedSequence]
-"""What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
+class EpisodeSeeds(NamedTuple):
+    """What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
+
+    world: SeedSequence
+    sensor_noise: SeedSequence
+    actions: SeedSequence
 
 
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
@@ -49,7 +53,7 @@ def generator(seed: SeedSequence) -> Generator:
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
     """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
     return [
-        (
+        EpisodeSeeds(
             stream(root, "world", generation, episode),
             stream(root, "sensor_noise", generation, episode),
             stream(root, "action_ties", generation, episode),
@@ -61,7 +65,7 @@ def training_episodes(root: int, generation: int, count: int, first: int = 0) ->
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
     """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and variants."""
     kinds = [[stream(SHARED_ROOT, purpose, episode, kind) for episode in range(count)] for kind in range(3)]
-    return list(zip(*kinds, strict=True))
+    return [EpisodeSeeds(*seeds) for seeds in zip(*kinds, strict=True)]
 
 
 def generator_in(state: Mapping[str, Any]) -> Generator:

@@ -15,9 +15,8 @@ from typing import Any
 
 import jinja2
 
-from exneat_cli.analysis.captions import budget_sentence, spent_in
 from exneat_cli.analysis.catalogue import Built
-from exneat_cli.analysis.study import Study
+from exneat_cli.analysis.study import Study, budget_sentence
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import make_directory, write_whole
 
@@ -29,35 +28,26 @@ _SECTIONS = {
     "Others": ("",),
 }
 """Title -> beginnings of the names of what stands there, in this order."""
-_PICTURES = {".png": "image/png", ".svg": "image/svg+xml"}
 _NUMBER = re.compile(r"[\[<>]?-?\d[^A-Za-z]*")
 
 
 def write_index(
     directory: Path, studies: Mapping[str, Study], artefacts: Sequence[Built], missing: Mapping[str, str]
 ) -> Path:
-    """Write ``index.html``; the same data gives the same bytes.
+    """Write ``index.html`` into `directory`, from where files are linked; the same data gives the same bytes.
 
-    Args:
-        directory: of the report; made if need be. Links to files are relative to it.
-        studies: by the name of their experiment.
-        artefacts: what was built, in the order in which it is to be shown within its section.
-        missing: name of what could not be built -> the text of its `MissingRunsError`.
+    Artefacts are shown in their order within each section. `studies` are by the name of their experiment, `missing`
+    holds the text of the `MissingRunsError` of what could not be built, by its name.
 
     Raises:
         ExneatError: a picture or a manifest cannot be read, or the page cannot be written.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("exneat_cli.analysis"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
-    environment.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
-    environment.tests["numeric"] = _NUMBER.fullmatch
-    page = environment.get_template("report.html.j2").render(
+    loader, strict = jinja2.PackageLoader("exneat_cli.analysis"), jinja2.StrictUndefined
+    jinja = jinja2.Environment(loader=loader, undefined=strict, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    jinja.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
+    jinja.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
+    jinja.tests["numeric"] = _NUMBER.fullmatch
+    page = jinja.get_template("report.html.j2").render(
         studies=[(study, _facts(study)) for study in studies.values()],
         sections=_sections(artefacts),
         missing=list(_missing(studies, missing)),
@@ -83,14 +73,13 @@ def _heading(built: Built) -> str:
 
 
 def _picture(paths: Sequence[Path]) -> str:
-    """The address of the first picture, PNG before SVG, with the picture itself inside; nothing if there is none."""
-    for suffix, kind in _PICTURES.items():
-        for path in paths:
-            if path.suffix == suffix:
-                try:
-                    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-                except OSError as error:
-                    raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
+    """The address of the PNG, with the picture itself inside; nothing if there is none."""
+    for path in paths:
+        if path.suffix == ".png":
+            try:
+                return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+            except OSError as error:
+                raise ExneatError(f"{path}: could not be read: {error.strerror}") from error
     return ""
 
 
@@ -103,7 +92,7 @@ def _facts(study: Study) -> dict[str, Any]:
         ends = dict.fromkeys((min(seeds, default=""), max(seeds, default="")))
         rows.append((label, str(finished), str(len(seeds)), " to ".join(map(str, ends))))
     versions: dict[str, set[str]] = {}
-    for manifest in study.manifests.values():
+    for manifest in study.finished.values():
         for library, version in manifest.versions.items():
             versions.setdefault(library, set()).add(str(version))
     conditions = study.results["condition"].unique()
@@ -111,7 +100,7 @@ def _facts(study: Study) -> dict[str, Any]:
         "rows": rows,
         "env_steps": f"{study.results['env_steps'].sum():,.0f}",
         "time": timedelta(seconds=round(study.results["wall_seconds"].sum())),
-        "budgets": budget_sentence([spent_in(study, each, study.trained_variants) for each in conditions]),
+        "budgets": budget_sentence([study.spent_in(each, study.trained_variants) for each in conditions]),
         "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
 

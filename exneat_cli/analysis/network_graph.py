@@ -17,10 +17,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch
 from matplotlib.transforms import Bbox
 
+from exneat_cli.analysis import network_layout as layout
 from exneat_cli.analysis import styles
-from exneat_cli.analysis.network_data import SENSORS, ChampionGraph, read_champion_graph
-from exneat_cli.analysis.network_layout import Places, input_groups, lay_out, natural_size
-from exneat_cli.records import RunDirectory
+from exneat_cli.analysis.network_layout import Node, Places
+from exneat_cli.errors import ExneatError
+from exneat_cli.records import Champion, RunDirectory, read_champion
 
 POSITIVE, NEGATIVE = styles.BLUE, styles.VERMILION
 MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles.OLIVE, styles.BLACK)
@@ -41,51 +42,58 @@ def draw_network(run: RunDirectory) -> list[Path]:
     Raises:
         ExneatError: the run has no champion, or its file is damaged.
     """
-    graph = read_champion_graph(run)
-    title = f"{run.path.name}: champion, test fitness {graph.test_fitness:.4g}"
-    return styles.save_figure(champions_figure(title, [graph]), run.plots / "network")
+    champion = champion_of(run)
+    title = f"{run.path.name}: champion, test fitness {champion.scores.test.fitness_mean:.4g}"
+    return styles.save_figure(champions_figure(title, [champion]), run.plots / "network")
 
 
-def champions_figure(title: str, graphs: Sequence[ChampionGraph], titles: Sequence[str] = ()) -> Figure:
+def champion_of(run: RunDirectory) -> Champion:
+    """Read the champion of a run.
+
+    Raises:
+        ExneatError: it has none, as baselines and unfinished runs have none, or its file is damaged.
+    """
+    if not run.champion.exists():
+        raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
+    return read_champion(run.champion)
+
+
+def champions_figure(title: str, champions: Sequence[Champion], titles: Sequence[str] = ()) -> Figure:
     """Draw champions side by side, with a legend; each with a title of its own, or none."""
-    sizes = [natural_size(graph) for graph in graphs]
-    widths = [wide for wide, _ in sizes]
-    width, height = sum(widths) + 0.3 * (len(widths) - 1), max(tall for _, tall in sizes)
+    widths, heights = zip(*(layout.natural_size(champion) for champion in champions), strict=True)
+    width, height = sum(widths) + 0.3 * (len(widths) - 1), max(heights)
     with styles.style():
         figure = Figure(figsize=(width, height + (1.6 if titles else 1.0)), layout="constrained")
-        panels = figure.subplots(1, len(graphs), squeeze=False, width_ratios=widths)[0]
-        for axes, graph, wide in zip(panels, graphs, widths, strict=True):
-            draw_champion(axes, graph, wide, height)
+        panels = figure.subplots(1, len(champions), squeeze=False, width_ratios=widths)[0]
+        for axes, champion, wide in zip(panels, champions, widths, strict=True):
+            draw_champion(axes, champion, wide, height)
         for axes, words in zip(panels, titles, strict=False):
             axes.set_title(words, fontsize=10)
         figure.suptitle(title, fontsize=12 if titles else 11)
         columns = max(2, int(width // 2.6))
-        figure.legend(handles=legend_entries(graphs), loc="outside lower center", ncols=columns, fontsize=8)
+        figure.legend(handles=legend_entries(champions), loc="outside lower center", ncols=columns, fontsize=8)
     return figure
 
 
-def draw_champion(axes: Axes, graph: ChampionGraph, width: float, height: float) -> None:
+def draw_champion(axes: Axes, champion: Champion, width: float, height: float) -> None:
     """Draw a champion on empty axes, which lose their frame and ticks; text is made to fit their size in inches."""
-    boxes, places = lay_out(graph, width, height)
+    boxes, places = layout.lay_out(champion, width, height)
+    used = layout.used_nodes(champion)
     axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
     axes.set_axis_off()
-    _draw_links(axes, graph, places)
+    _draw_links(axes, champion, places, used)
+    _draw_edges(axes, champion, places, used)
     for m, box in enumerate(boxes):
-        _draw_box(axes, graph, m, box)
-        _draw_edges(axes, graph, m, places[m])
-        _draw_nodes(axes, graph, m, places[m])
-        _name_inputs(axes, graph, m, places[m])
-        for output, actuator in enumerate(graph.plan.modules[m].drives):
-            x, y = places[m][output]
-            name = graph.actuators[actuator].replace("_", " ")
-            axes.text(x, y + 0.08, name, fontsize=7, ha="center", va="bottom", zorder=5)
+        _draw_box(axes, champion, m, box)
+        _draw_nodes(axes, champion, m, places, used)
+        _name_inputs(axes, champion, m, places)
 
 
-def legend_entries(graphs: Sequence[ChampionGraph]) -> list[Artist]:
-    """Say what lines and shapes mean, as far as they occur in one of `graphs`."""
-    thickest = " and ".join(f"{_thick_from(graph):.2g}" for graph in graphs)
-    delays = {link.delayed for graph in graphs for link in graph.links}
-    loops = not all(graph.feed_forward for graph in graphs)
+def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
+    """Say what lines and shapes mean, as far as they occur in one of `champions`."""
+    thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
+    delays = {is_delayed for champion in champions for _, _, is_delayed in layout.links_of(champion)}
+    loops = not all(champion.feed_forward for champion in champions)
     entries: dict[str, styles.Look] = {
         "positive weight": {"color": POSITIVE, "linewidth": 2.0},
         "negative weight": {"color": NEGATIVE, "linewidth": 2.0},
@@ -110,14 +118,15 @@ def _colour(m: int) -> str:
     return MODULE_COLOURS[m % len(MODULE_COLOURS)]
 
 
-def _draw_box(axes: Axes, graph: ChampionGraph, m: int, box: Bbox) -> None:
-    module = graph.plan.modules[m]
+def _draw_box(axes: Axes, champion: Champion, m: int, box: Bbox) -> None:
+    modules = champion.plan.modules
     look: styles.Look = {"facecolor": to_rgba(_colour(m), 0.07), "edgecolor": to_rgba(_colour(m), 0.8)}
     corner, width, height = (box.x0 + 0.05, box.y0 + 0.05), box.width - 0.1, box.height - 0.1
     axes.add_patch(FancyBboxPatch(corner, width, height, boxstyle="round,pad=0.05", linewidth=1.0, zorder=0, **look))
-    sharers = sum(other.subpopulation == module.subpopulation for other in graph.plan.modules)
-    shared = f"  (genome {module.subpopulation + 1}, shared by {sharers})" if sharers > 1 else ""
-    name = module.name.replace("_", " ") + shared
+    genome = modules[m].subpopulation
+    sharers = sum(other.subpopulation == genome for other in modules)
+    shared = f"  (genome {genome + 1}, shared by {sharers})" if sharers > 1 else ""
+    name = modules[m].name.replace("_", " ") + shared
     axes.text(box.x0 + 0.1, box.y1 - 0.14, name, fontsize=8.5, va="center", weight="bold", zorder=5)
 
 
@@ -126,36 +135,31 @@ def _draw_curve(axes: Axes, start: tuple[float, float], end: tuple[float, float]
     axes.add_patch(FancyArrowPatch(start, end, connectionstyle=bent, arrowstyle="-", shrinkA=0, shrinkB=0, **look))
 
 
-def _draw_links(axes: Axes, graph: ChampionGraph, places: Sequence[Places]) -> None:
-    opacity, width = (0.45, 0.6) if len(graph.links) > _MANY_LINKS else (0.8, 0.9)
-    for link in graph.links:
-        (source, start), (target, end) = link.source, link.target
-        look = {
-            "edgecolor": _colour(source),
-            "alpha": opacity if {link.source, link.target} <= graph.used else FAINT,
-            "linewidth": width,
-            "linestyle": (0.0, (4.0, 2.5)) if link.delayed else "-",
-        }
-        _draw_curve(axes, places[source][start], places[target][end], _BOW, zorder=1, **look)
+def _draw_links(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
+    links = layout.links_of(champion)
+    opacity, width = (0.45, 0.6) if len(links) > _MANY_LINKS else (0.8, 0.9)
+    for source, target, is_delayed in links:
+        alpha = opacity if {source, target} <= used else FAINT
+        look = {"edgecolor": _colour(source[0]), "alpha": alpha, "linewidth": width, "zorder": 1}
+        dashes = (0.0, (4.0, 2.5)) if is_delayed else "-"
+        _draw_curve(axes, places[source], places[target], _BOW, linestyle=dashes, **look)
 
 
-def _thick_from(graph: ChampionGraph) -> float:
+def _thick_from(champion: Champion) -> float:
     """Weights from here on are drawn alike."""
-    return float(np.quantile([abs(edge.weight) for own in graph.edges for edge in own] or [0.0], _ALIKE))
+    return float(np.quantile([abs(weight) for _, _, weight in layout.edges_of(champion)] or [0.0], _ALIKE))
 
 
-def _draw_edges(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> None:
+def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
     """Draw light ones first, so that the heavy ones stay visible among hundreds."""
-    limit = _thick_from(graph) or 1.0
-    many = sum(len(own) for own in graph.edges) > _MANY_EDGES
-    thickest, contrast = (2.2, 1.5) if many else (2.8, 1.0)
+    edges, limit = layout.edges_of(champion), _thick_from(champion) or 1.0
+    thickest, contrast = (2.2, 1.5) if len(edges) > _MANY_EDGES else (2.8, 1.0)
     lines, widths, colours = [], [], []
-    for edge in sorted(graph.edges[m], key=lambda edge: abs(edge.weight)):
-        start, end = places[edge.source], places[edge.target]
-        share = min(1.0, abs(edge.weight) / limit)
-        is_used = {(m, edge.source), (m, edge.target)} <= graph.used
-        opacity = 0.16 + 0.74 * share**contrast if is_used else FAINT
-        colour = to_rgba(POSITIVE if edge.weight >= 0 else NEGATIVE, opacity)
+    for source, target, weight in sorted(edges, key=lambda edge: abs(edge[2])):
+        start, end = places[source], places[target]
+        share = min(1.0, abs(weight) / limit)
+        opacity = 0.16 + 0.74 * share**contrast if {source, target} <= used else FAINT
+        colour = to_rgba(POSITIVE if weight >= 0 else NEGATIVE, opacity)
         look: styles.Look = {"edgecolor": colour, "linewidth": 0.3 + thickest * share, "zorder": 2}
         if end[1] > start[1]:
             lines.append([start, end])
@@ -168,39 +172,45 @@ def _draw_edges(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> Non
     axes.add_collection(LineCollection(lines, linewidths=widths, colors=colours, capstyle="round", zorder=2))
 
 
-def _draw_nodes(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> None:
-    inputs = graph.inputs[m]
-    small = 10.0 if len(inputs) > 30 else 22.0
+def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: set[Node]) -> None:
+    """Draw inputs, hidden nodes and outputs, and name the actuators that the outputs drive."""
+    module = champion.plan.modules[m]
+    small = 10.0 if len(module.pins) > 30 else 22.0
     groups = (
-        ([-1 - k for k, source in enumerate(inputs) if source[0] == SENSORS], "o", "white", small),
-        ([-1 - k for k, source in enumerate(inputs) if source[0] != SENSORS], "s", _INNER, small),
-        (graph.hidden[m], "o", _INNER, 34.0),
-        (range(graph.plan.modules[m].outputs), "o", _GREY, 34.0),
+        ([(m, -1 - k) for k, pin in enumerate(module.pins) if pin.is_sensor], "o", "white", small),
+        ([(m, -1 - k) for k, pin in enumerate(module.pins) if not pin.is_sensor], "s", _INNER, small),
+        ([node for node in layout.hidden_of(champion) if node[0] == m], "o", _INNER, 34.0),
+        ([(m, output) for output in range(module.outputs)], "o", _GREY, 34.0),
     )
-    for keys, marker, face, size in groups:
-        opacity = [1.0 if (m, key) in graph.used else 2 * FAINT for key in keys]
+    for nodes, marker, face, size in groups:
+        opacity = [1.0 if node in used else 2 * FAINT for node in nodes]
         faces, rims = ([to_rgba(colour, alpha) for alpha in opacity] for colour in (face, _GREY))
-        if keys:
-            x, y = zip(*(places[key] for key in keys), strict=True)
+        if nodes:
+            x, y = zip(*(places[node] for node in nodes), strict=True)
             axes.scatter(x, y, size, faces, marker=marker, edgecolors=rims, linewidths=0.7, zorder=3)
+    for output, actuator in enumerate(module.drives):
+        left, top = places[m, output]
+        name = champion.actuators[actuator].replace("_", " ")
+        axes.text(left, top + 0.08, name, fontsize=7, ha="center", va="bottom", zorder=5)
 
 
-def _name_inputs(axes: Axes, graph: ChampionGraph, m: int, places: Places) -> None:
+def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
     """Write indices under the sensors where they fit, and a bracket with words under each group of inputs."""
-    inputs = graph.inputs[m]
-    x = [places[-1 - k][0] for k in range(len(inputs))]
+    plan = champion.plan
+    pins = plan.modules[m].pins
+    x = [places[m, -1 - k][0] for k in range(len(pins))]
     room = _POINTS * min((right - left for left, right in pairwise(x)), default=1.0)
-    for group in input_groups(graph, m):
-        y = places[-1 - group[0]][1]
-        kind = graph.kind_of(inputs[group[0]])
-        if kind == "sensors" and room >= _LEAST_ROOM:
+    for group in layout.input_groups(champion, m):
+        y = places[m, -1 - group[0]][1]
+        kind = plan.kind_of(pins[group[0]])
+        if kind == "sensor" and room >= _LEAST_ROOM:
             turn = 90 if room < _ROOM_TO_STAND else 0
             for k in group:
-                axes.text(x[k], y - 0.06, str(inputs[k][1]), fontsize=5.5, rotation=turn, ha="center", va="top")
+                axes.text(x[k], y - 0.06, str(pins[k].index), fontsize=5.5, rotation=turn, ha="center", va="top")
         left, right = x[group[0]], x[group[-1]]
         axes.plot([left - 0.03, right + 0.03], [y - 0.28, y - 0.28], color=_GREY, linewidth=0.7)
         # In two lines, as groups of links are narrow.
-        sources = {inputs[k][0] for k in group}
-        whose = graph.plan.modules[sources.pop()].name.replace("_", " ") if len(sources) == 1 else "others"
-        words = "sensors, by index" if kind == "sensors" else f"{kind} of\n{whose}"
-        axes.text((left + right) / 2, y - 0.31, words, fontsize=6.0, ha="center", va="top")
+        sources = {pins[k].module for k in group}
+        whose = plan.modules[sources.pop()].name.replace("_", " ") if len(sources) == 1 else "others"
+        words = {"sensor": "sensors, by index", "output": f"outputs of\n{whose}", "hidden": f"hidden of\n{whose}"}
+        axes.text((left + right) / 2, y - 0.31, words[kind], fontsize=6.0, ha="center", va="top")

@@ -1,18 +1,22 @@
-"""Where the modules and nodes of a champion go on the page, in inches; pure geometry."""
+"""A champion as a graph, and where its modules and nodes go on the page, in inches; nothing is built or run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import groupby
 
 import numpy as np
 from matplotlib.transforms import Bbox
 
-from exneat_cli.analysis.network_data import ChampionGraph, Edge
+from exneat_cli.records import Champion
 from exneat_cli.wiring import Module
 
-Places = dict[int, tuple[float, float]]
-"""(x, y) of the inputs and nodes of one module, by key."""
+Node = tuple[int, int]
+"""A module, and a key in its genome: outputs from 0, then hidden nodes; input k is -1 - k."""
+Edge = tuple[Node, Node, float]
+"""An enabled connection within a module: source, target and weight."""
+Places = dict[Node, tuple[float, float]]
+"""(x, y) of inputs and nodes."""
 
 # Inches. Links run in the gap between boxes. What a box keeps free of nodes: at its top, above outputs that drive
 # something, at its bottom, at its sides.
@@ -27,102 +31,146 @@ _SAME_ROW = 0.1
 """Modules whose distance is below this share of the body's length stand in one row."""
 
 
-def page_direction(modules: Sequence[Module]) -> list[tuple[float, float]]:
-    """Say where each module lies as one looks at the page: to the right, and up.
+def hidden_of(champion: Champion) -> list[Node]:
+    """The hidden nodes of all modules, initial and grown, in order."""
+    return [
+        (m, key)
+        for m, module in enumerate(champion.plan.modules)
+        for key in sorted(node.id for node in champion.genomes[module.subpopulation].nodes)
+        if key >= module.outputs
+    ]
 
-    A body looks up the page: x ahead is up, y to the left is left. The parts of a map, which are called
-    up and down, keep the map's x and y.
+
+def edges_of(champion: Champion) -> list[Edge]:
+    """The enabled connections within modules; modules that share a genome repeat them."""
+    return [
+        ((m, gene.source), (m, gene.target), gene.weight)
+        for m, module in enumerate(champion.plan.modules)
+        for gene in champion.genomes[module.subpopulation].connections
+        if gene.enabled
+    ]
+
+
+def links_of(champion: Champion) -> list[tuple[Node, Node, bool]]:
+    """Source, target (an input) and whether it is delayed of every link between modules, but for deleted sources."""
+    hidden = set(hidden_of(champion))
+    return [
+        ((pin.module, pin.index), (m, -1 - k), pin.delayed)
+        for m, module in enumerate(champion.plan.modules)
+        for k, pin in enumerate(module.pins)
+        if champion.plan.kind_of(pin) == "output" or (pin.module, pin.index) in hidden
+    ]
+
+
+def used_nodes(champion: Champion) -> set[Node]:
+    """The nodes on a path from a sensor to an output that drives an actuator, by way of any module."""
+    modules = champion.plan.modules
+    steps = [(source, target) for source, target, _ in (*edges_of(champion), *links_of(champion))]
+    sensing = {(m, -1 - k) for m, module in enumerate(modules) for k, pin in enumerate(module.pins) if pin.is_sensor}
+    driving = {(m, output) for m, module in enumerate(modules) for output in range(len(module.drives))}
+    return _reachable(sensing, steps) & _reachable(driving, [(target, source) for source, target in steps])
+
+
+def _reachable(found: set[Node], steps: Collection[tuple[Node, Node]]) -> set[Node]:
+    while new := {target for source, target in steps if source in found} - found:
+        found = found | new
+    return found
+
+
+def input_groups(champion: Champion, m: int) -> list[list[int]]:
+    """The inputs of module `m` in their order; neighbours that read one kind of thing make a group."""
+    plan, pins = champion.plan, champion.plan.modules[m].pins
+    return [list(group) for _, group in groupby(range(len(pins)), key=lambda k: plan.kind_of(pins[k]))]
+
+
+def depths(hidden: Iterable[Node], edges: Collection[Edge]) -> dict[Node, int]:
+    """Find the layers of inputs, which is 0, and of hidden nodes: one more than that of their deepest source.
+
+    Connections out of outputs and those that close a cycle do not count. In a cycle the node comes
+    first that inputs or placed nodes reach, then the one that waits for fewest, then the lowest.
     """
-    if any(module.name in ("up", "down") for module in modules):
-        return [module.position for module in modules]
-    return [(-module.position[1], module.position[0]) for module in modules]
+    found = {source: 0 for source, _, _ in edges if source[1] < 0}
+    sources: dict[Node, set[Node]] = {node: set() for node in hidden}
+    for source, target, _ in edges:
+        if target in sources and source != target and (source in found or source in sources):
+            sources[target].add(source)
+
+    def turn(node: Node) -> tuple[bool, bool, int, Node]:
+        waits_for = len(sources[node] - found.keys())
+        return waits_for > 0, waits_for == len(sources[node]), waits_for, node
+
+    while sources:
+        node = min(sources, key=turn)
+        found[node] = 1 + max((found[source] for source in sources.pop(node) if source in found), default=0)
+    return found
 
 
-def natural_size(graph: ChampionGraph) -> tuple[float, float]:
+def natural_size(champion: Champion) -> tuple[float, float]:
     """Width and height at which everything can be told apart, within what fits on a screen."""
-    modules = graph.plan.modules
-    rows = _rows(page_direction(modules))
-    widest = max(len(row) for row in rows)
-    slots = [len(own) + len(input_groups(graph, m)) - 1 for m, own in enumerate(graph.inputs)]
-    room = max(max(INPUT * count, ACTUATOR * len(module.drives)) for count, module in zip(slots, modules, strict=True))
-    deepest = max(max(depths(graph.hidden[m], graph.edges[m]).values(), default=0) for m in range(len(modules)))
-    width = widest * (2 * SIDE + room) + (widest - 1) * GAP
+    modules = champion.plan.modules
+    rows = _rows(modules)
+    columns = max(len(row) for row in rows)
+    slots = [len(module.pins) + len(input_groups(champion, m)) - 1 for m, module in enumerate(modules)]
+    room = max(*(INPUT * count for count in slots), *(ACTUATOR * len(module.drives) for module in modules))
+    deepest = max(depths(hidden_of(champion), edges_of(champion)).values(), default=0)
+    width = columns * (2 * SIDE + room) + (columns - 1) * GAP
     height = len(rows) * (TITLE + OUTPUT_NAMES + INPUT_NAMES + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
     return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 10.0).clip(4.0))
 
 
-def lay_out(graph: ChampionGraph, width: float, height: float) -> tuple[list[Bbox], list[Places]]:
+def lay_out(champion: Champion, width: float, height: float) -> tuple[list[Bbox], Places]:
     """Place every module in a box, and the nodes within it, on a page of the given size; rows of boxes are centred."""
-    rows = _rows(page_direction(graph.plan.modules))
+    rows = _rows(champion.plan.modules)
     columns = max(len(row) for row in rows)
     box_width = (width - (columns - 1) * GAP) / columns
     box_height = (height - (len(rows) - 1) * GAP) / len(rows)
     boxes: dict[int, Bbox] = {}
+    places: Places = {}
     for r, row in enumerate(rows):
         left = (width - len(row) * box_width - (len(row) - 1) * GAP) / 2
         bottom = height - (r + 1) * box_height - r * GAP
         for c, m in enumerate(row):
             boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
-    return [boxes[m] for m in sorted(boxes)], [_places(graph, m, boxes[m]) for m in sorted(boxes)]
+            places |= _places(champion, m, boxes[m])
+    return [boxes[m] for m in sorted(boxes)], places
 
 
-def input_groups(graph: ChampionGraph, m: int) -> list[list[int]]:
-    """The inputs of module `m` in their order; neighbours that read one kind of thing make a group."""
-    inputs = graph.inputs[m]
-    return [list(group) for _, group in groupby(range(len(inputs)), key=lambda k: graph.kind_of(inputs[k]))]
+def _rows(modules: Sequence[Module]) -> list[list[int]]:
+    """Indices of modules from the top row of the page to the bottom one, each from left to right.
 
-
-def depths(hidden: Iterable[int], edges: Iterable[Edge]) -> dict[int, int]:
-    """Find the layer of each hidden node, from 1: one more than that of its deepest source, inputs being 0.
-
-    Connections out of outputs and those that close a cycle do not count. In a cycle the node comes
-    first that inputs or placed nodes reach, then the one that waits for fewest, then the lowest.
+    A body looks up the page: x ahead is up, y to the left is left. The parts of a map, which are called
+    up and down, keep the map's x and y.
     """
-    sources: dict[int, set[int]] = {node: set() for node in sorted(hidden)}
-    for source, target, _ in edges:
-        if target in sources and source != target and (source < 0 or source in sources):
-            sources[target].add(source)
-    found: dict[int, int] = {}
-
-    def turn(node: int) -> tuple[bool, bool, int]:
-        waits_for = sum(source >= 0 and source not in found for source in sources[node])
-        return waits_for > 0, waits_for == len(sources[node]), waits_for
-
-    while len(found) < len(sources):
-        chosen = min((node for node in sources if node not in found), key=turn)
-        found[chosen] = 1 + max((found.get(source, 0) for source in sources[chosen]), default=0)
-    return found
-
-
-def _rows(directions: Sequence[tuple[float, float]]) -> list[list[int]]:
-    """Indices of modules from the top row to the bottom one, each from left to right."""
-    heights = [up for _, up in directions]
-    tolerance = _SAME_ROW * (max(heights) - min(heights))
+    is_map = any(module.name in ("up", "down") for module in modules)
+    right = [module.position[0] if is_map else -module.position[1] for module in modules]
+    up = [module.position[1] if is_map else module.position[0] for module in modules]
+    tolerance = _SAME_ROW * (max(up) - min(up))
     rows: list[list[int]] = []
-    for m in sorted(range(len(directions)), key=lambda m: -heights[m]):
-        if rows and heights[rows[-1][0]] - heights[m] <= tolerance:
+    for m in sorted(range(len(modules)), key=lambda m: -up[m]):
+        if rows and up[rows[-1][0]] - up[m] <= tolerance:
             rows[-1].append(m)
         else:
             rows.append([m])
-    return [sorted(row, key=lambda m: (directions[m][0], m)) for row in rows]
+    return [sorted(row, key=lambda m: (right[m], m)) for row in rows]
 
 
-def _places(graph: ChampionGraph, m: int, box: Bbox) -> Places:
-    """Inputs at the bottom, outputs at the top, hidden nodes in layers between them."""
-    module, edges = graph.plan.modules[m], graph.edges[m]
+def _places(champion: Champion, m: int, box: Bbox) -> Places:
+    """Inputs of module `m` at the bottom, outputs at the top, hidden nodes in layers between them."""
+    module = champion.plan.modules[m]
+    edges = [edge for edge in edges_of(champion) if edge[0][0] == m]
+    hidden = [node for node in hidden_of(champion) if node[0] == m]
     bottom, top = box.y0 + INPUT_NAMES, box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
-    groups = input_groups(graph, m)
+    groups = input_groups(champion, m)
     slots = _spread(box, len(module.pins) + len(groups) - 1)
     # An empty slot between groups.
-    places = {-1 - k: (slots[k + gap], bottom) for gap, group in enumerate(groups) for k in group}
-    depth = depths(graph.hidden[m], edges)
-    by_depth = sorted(graph.hidden[m], key=depth.__getitem__)
-    layers = [list(layer) for _, layer in groupby(by_depth, key=depth.__getitem__)]
+    places = {(m, -1 - k): (slots[k + gap], bottom) for gap, group in enumerate(groups) for k in group}
+    depth = depths(hidden, edges)
+    layers = [list(layer) for _, layer in groupby(sorted(hidden, key=depth.__getitem__), key=depth.__getitem__)]
     for d, layer in enumerate(layers, start=1):
         y = bottom + (top - bottom) * d / (len(layers) + 1)
         ordered = sorted(layer, key=lambda node: (_centre(node, edges, places), node))
         places |= {node: (x, y) for node, x in zip(ordered, _spread(box, len(layer)), strict=True)}
-    places |= {output: (x, top) for output, x in enumerate(_spread(box, module.outputs))}
+    places |= {(m, output): (x, top) for output, x in enumerate(_spread(box, module.outputs))}
     for layer in layers:
         places |= _sidestepped(layer, edges, places, step=(box.width - 2 * SIDE) / len(layer))
     return places
@@ -134,19 +182,19 @@ def _spread(box: Bbox, count: int) -> list[float]:
     return [box.x0 + SIDE + room * (k + 0.5) / count for k in range(count)]
 
 
-def _centre(node: int, edges: Iterable[Edge], places: Places) -> float:
+def _centre(node: Node, edges: Iterable[Edge], places: Places) -> float:
     """The mean place of what a node reads, weighted: nodes in this order have fewer lines cross."""
-    read = [edge for edge in edges if edge.target == node and edge.source in places]
-    total = sum(abs(edge.weight) for edge in read)
-    return sum(places[edge.source][0] * abs(edge.weight) for edge in read) / total if total > 0 else np.inf
+    read = [(places[source][0], abs(weight)) for source, target, weight in edges if target == node and source in places]
+    total = sum(weight for _, weight in read)
+    return sum(x * weight for x, weight in read) / total if total > 0 else np.inf
 
 
-def _sidestepped(layer: Sequence[int], edges: Iterable[Edge], places: Places, step: float) -> Places:
+def _sidestepped(layer: Sequence[Node], edges: Iterable[Edge], places: Places, step: float) -> Places:
     """The layer, moved aside if connections that skip it would seem to end at its nodes."""
     y = places[layer[0]][1]
     crossings = []
-    for edge in edges:
-        (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
+    for source, target, _ in edges:
+        (x0, y0), (x1, y1) = places[source], places[target]
         if min(y0, y1) < y < max(y0, y1):
             crossings.append(x0 + (y - y0) / (y1 - y0) * (x1 - x0))
 

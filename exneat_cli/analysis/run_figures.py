@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.study import read_csv
@@ -35,7 +34,7 @@ def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
         for column, look in _CURVES.items():
             axes.plot(history["generation"], history[column], **look)
         axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        styles.tick_levels(axes, history["generation"])
         axes.legend(loc="upper left")
     return styles.save_figure(figure, run.plots / "training")
 
@@ -54,18 +53,13 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
         return []
     columns = min(len(sweeps), MOST_COLUMNS)
     lines = math.ceil(len(sweeps) / columns)
+    band = "one standard deviation over episodes"
     with styles.style():
         figure = Figure(figsize=(max(6.2, 3.6 * columns), 3.0 * lines + 0.9), layout="constrained")
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, (sweep, levels) in zip(panels, sweeps, strict=False):
             x, mean, spread = levels["level"], levels["fitness_mean"], levels["fitness_std"]
-            band = {
-                "color": styles.BLUE,
-                "alpha": 0.18,
-                "linewidth": 0.0,
-                "label": "one standard deviation over episodes",
-            }
-            axes.fill_between(x, mean - spread, mean + spread, **band)
+            axes.fill_between(x, mean - spread, mean + spread, color=styles.BLUE, alpha=0.18, linewidth=0.0, label=band)
             axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
             styles.tick_levels(axes, x)
             axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
@@ -88,34 +82,22 @@ def draw_path(run: RunDirectory) -> list[Path]:
         if run.tiles.exists():
             figure = _on_tiles(trace, read_csv(run.tiles))
             figure.suptitle(title)
-        elif {"x", "y"} <= set(trace.columns):
-            figure = _on_ground(trace, title)
         else:
-            figure = _over_time(trace, title)
+            figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+            axes = figure.add_subplot(title=title)
+            if {"x", "y"} <= set(trace.columns):
+                axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
+                points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
+                axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
+                axes.set(xlabel="x, ahead (m)", ylabel="y, left (m)")
+                axes.set_aspect("equal", adjustable="datalim")
+                figure.colorbar(points, ax=axes, label="control step")
+            else:
+                for term in trace.columns.drop("step"):
+                    axes.plot(trace["step"], trace[term], label=term.replace("_", " "))
+                axes.set(xlabel="control step", ylabel="reward of the step")
+            axes.legend(loc="best")
     return styles.save_figure(figure, run.plots / "path")
-
-
-def _on_ground(trace: pd.DataFrame, title: str) -> Figure:
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.add_subplot()
-    axes.plot(trace["x"], trace["y"], color="#bbbbbb", linewidth=1.0, zorder=1)
-    points = axes.scatter(trace["x"], trace["y"], c=trace["step"], s=4, cmap="viridis", zorder=2)
-    axes.plot(trace["x"].iloc[0], trace["y"].iloc[0], "o", color=styles.VERMILION, label="start", zorder=3)
-    axes.set(title=title, xlabel="x, ahead (m)", ylabel="y, left (m)")
-    axes.set_aspect("equal", adjustable="datalim")
-    figure.colorbar(points, ax=axes, label="control step")
-    axes.legend(loc="best")
-    return figure
-
-
-def _over_time(trace: pd.DataFrame, title: str) -> Figure:
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.add_subplot()
-    for term in trace.columns.drop("step"):
-        axes.plot(trace["step"], trace[term], label=term.replace("_", " "))
-    axes.set(title=title, xlabel="control step", ylabel="reward of the step")
-    axes.legend(loc="best")
-    return figure
 
 
 def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:

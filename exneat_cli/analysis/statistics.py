@@ -19,7 +19,6 @@ CONFIDENCE = 0.95
 RESAMPLES = 9999
 EXACT_BELOW = 21
 """Samples without ties are compared by all their orders when both are smaller than this."""
-_NO_INTERVAL = (math.nan, math.nan)
 
 
 def mean(values: Values) -> float:
@@ -47,28 +46,24 @@ def bootstrap_interval(values: Values) -> tuple[float, float]:
     """
     runs = np.sort(np.asarray(values, dtype=np.float64))
     if len(runs) < 2 or not np.isfinite(runs).all():
-        return _NO_INTERVAL
+        return math.nan, math.nan
     lowest, highest = float(runs[0]), float(runs[-1])
     if highest - lowest <= 1e-12 * max(abs(lowest), abs(highest)):
         return lowest, highest
+    z = math.sqrt(len(runs) / (len(runs) - 1)) * stats.t.isf((1.0 - CONFIDENCE) / 2.0, len(runs) - 1)
+    # Two runs ask for a level that rounds to 1, where the correction of the bias is 0 times infinity.
+    level = min(float(1.0 - 2.0 * stats.norm.sf(z)), 1.0 - 1e-6)
     # Between 0 and 1, so that cubes of tiny or huge values neither vanish nor overflow.
     unit = stats.bootstrap(
         ((runs - lowest) / (highest - lowest),),
         np.mean,
         n_resamples=RESAMPLES,
-        confidence_level=_widened_level(len(runs)),
+        confidence_level=level,
         method="BCa",
         rng=generator(stream(SHARED_ROOT, "bootstrap")),
     ).confidence_interval
     low, high = (lowest + float(end) * (highest - lowest) for end in (unit.low, unit.high))
     return max(lowest, low), min(highest, high)
-
-
-def _widened_level(runs: int) -> float:
-    tail = (1.0 - CONFIDENCE) / 2.0
-    z = math.sqrt(runs / (runs - 1)) * stats.t.isf(tail, runs - 1)
-    # Two runs ask for a level that rounds to 1, where the correction of the bias is 0 times infinity.
-    return min(float(1.0 - 2.0 * stats.norm.sf(z)), 1.0 - 1e-6)
 
 
 def mann_whitney_p(one: Values, other: Values) -> float:
@@ -83,17 +78,14 @@ def mann_whitney_p(one: Values, other: Values) -> float:
     return float(stats.mannwhitneyu(one, other, method="exact" if exact else "asymptotic").pvalue)
 
 
-def holm(p_values: Values) -> NDArray[np.float64]:
+def holm(p_values: pd.Series) -> pd.Series:
     """Correct each p for how many there are (Holm, A simple sequentially rejective test procedure, 1979).
 
     NaN stays NaN and does not count.
     """
-    p = np.asarray(p_values, dtype=np.float64)
-    order = np.argsort(p, kind="stable")[: np.count_nonzero(~np.isnan(p))]
-    steps = np.minimum(1.0, np.arange(len(order), 0, -1) * p[order])
-    corrected = np.full(p.shape, math.nan)
-    corrected[order] = np.maximum.accumulate(steps)
-    return corrected
+    ranked = p_values.dropna().sort_values(kind="stable")
+    steps = (ranked * np.arange(len(ranked), 0, -1)).clip(upper=1.0)
+    return steps.cummax().reindex(p_values.index)
 
 
 def a12(one: Values, other: Values) -> float:
@@ -110,23 +102,16 @@ def a12(one: Values, other: Values) -> float:
 
 
 def efficiency(curve: Values, target: float) -> int | None:
-    """Find the first generation, counted from 1, at which `curve` reaches `target`; None if it never does.
-
-    Args:
-        curve: mean best so far over runs, one entry per generation.
-        target: final entry of the curve that is to be reached.
-    """
+    """Find the first generation, from 1, at which a mean curve of runs reaches `target`; None if it never does."""
     # Equal runs in another order may add up to a mean that differs in the last digit.
     reached = np.flatnonzero(np.asarray(curve) >= target - 1e-9 * abs(target))
     return int(reached[0]) + 1 if len(reached) else None
 
 
 def compare(values: Mapping[str, Values], untrained: Collection[str] = ()) -> pd.DataFrame:
-    """Summarise variants and compare each with the first one.
+    """Summarise variants, each with one value per run or none, and compare each with the first one.
 
-    Args:
-        values: variant -> one value per run; may be empty.
-        untrained: variants without p: they are no competitors, so they must not cost the others power.
+    Those in `untrained` have no p: they are no competitors, so they must not cost the others power.
 
     Returns:
         One row per variant, NaN for what does not exist. Columns: runs (how many values), mean, low and high (ends of
@@ -145,6 +130,5 @@ def compare(values: Mapping[str, Values], untrained: Collection[str] = ()) -> pd
         )
         for variant, runs in values.items()
     ]
-    columns = ["runs", "mean", "low", "high", "iqm", "p_holm", "a12"]
-    table = pd.DataFrame(rows, columns=columns, index=list(values))
-    return table.assign(p_holm=holm(table["p_holm"].to_numpy(dtype=np.float64)))
+    table = pd.DataFrame(rows, list(values), ["runs", "mean", "low", "high", "iqm", "p_holm", "a12"])
+    return table.assign(p_holm=holm(table["p_holm"].astype(float)))

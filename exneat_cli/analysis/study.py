@@ -1,4 +1,4 @@
-"""What a report is made from: the planned runs of experiments, and what their files hold, as tables.
+"""What a report is made from: the planned runs of experiments, what their files hold, and what their training spent.
 
 A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, so
 runs with other settings never slip in, whatever else lies in the same folder.
@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -19,7 +20,9 @@ from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDire
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
-_RESULTS = ("training", "validation", "test", "full_reward", "episodes", "env_steps", "wall_seconds")
+ENOUGH_RUNS = 10
+_REACHED = ("training", "validation", "test", "full_reward")
+_SPENT = ("episodes", "env_steps", "wall_seconds")
 
 
 class MissingRunsError(ExneatError):
@@ -93,15 +96,10 @@ class Study:
         return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
 
     @functools.cached_property
-    def manifests(self) -> Mapping[PlannedRun, Manifest]:
-        """The finished runs with their manifests."""
-        finished = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
-        return {run: run.directory.read_manifest() for run in finished}
-
-    @property
-    def finished(self) -> tuple[PlannedRun, ...]:
-        """The runs that are done."""
-        return tuple(self.manifests)
+    def finished(self) -> Mapping[PlannedRun, Manifest]:
+        """The runs that are done, with their manifests."""
+        done = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
+        return {run: run.directory.read_manifest() for run in done}
 
     def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
         """Finished runs of one variant in one condition, in the order of their seeds."""
@@ -130,20 +128,29 @@ class Study:
         baselines have test figures alone.
         """
         rows = []
-        for run, manifest in self.manifests.items():
-            result = manifest.result
+        for run, manifest in self.finished.items():
+            result, spent = manifest.result, manifest.budget_spent
             assert result is not None
-            figures = {"training": result.training, "validation": result.validation}
-            test = {"test": result.champion.fitness_mean, "full_reward": result.champion.full_reward_mean}
-            place = {"condition": run.condition, "variant": run.variant, "seed": run.seed}
-            rows.append({**figures, **manifest.budget_spent, **test, **place})
-        table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_RESULTS])
-        return table.astype(dict.fromkeys(_RESULTS, float))
+            test = result.champion
+            reached = (result.training, result.validation, test.fitness_mean, test.full_reward_mean)
+            rows.append((run.condition, run.variant, run.seed, *reached, *(spent.get(name) for name in _SPENT)))
+        table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_REACHED, *_SPENT])
+        return table.astype(dict.fromkeys((*_REACHED, *_SPENT), float))
+
+    def spent_in(self, condition: str, variants: Collection[str]) -> pd.DataFrame:
+        """What training took in one condition: a row per run with the variant's label, episodes and env_steps."""
+        results = self.results[self.results["condition"] == condition]
+        here = results[results["variant"].isin(list(variants))]
+        return here.assign(variant=here["variant"].map(self.variants))[["variant", "episodes", "env_steps"]].dropna()
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-        validation = dict(zip(self.manifests, self.results["validation"].fillna(-math.inf), strict=True))
+        validation = dict(zip(self.finished, self.results["validation"].fillna(-math.inf), strict=True))
         return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
+
+    def best_seeds(self, condition: str, variant: str, among: Collection[Any]) -> list[int]:
+        """Seeds of the `BEST` runs that are best on validation, or of fewer, of those whose seeds are in `among`."""
+        return [run.seed for run in self.best_first(condition, variant) if run.seed in among][:BEST]
 
     def history(self, condition: str) -> pd.DataFrame:
         """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
@@ -165,13 +172,10 @@ class Study:
             for run in self.finished
             if run.condition == condition
             for row in read_robustness(run.directory.robustness)
-            if self._is_planned(row)
+            if self.levels is None or row.level in self.levels.get(row.parameter, ())
+            if self.sweep_episodes in (None, row.episodes)
         ]
         return pd.DataFrame(rows, columns=[*RobustnessRow._fields, "seed"])
-
-    def _is_planned(self, row: RobustnessRow) -> bool:
-        is_level = self.levels is None or row.level in self.levels.get(row.parameter, ())
-        return is_level and self.sweep_episodes in (None, row.episodes)
 
 
 def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
@@ -191,3 +195,38 @@ def read_csv(path: Path, columns: Sequence[str] = ()) -> pd.DataFrame:
         if column not in table or not pd.api.types.is_numeric_dtype(table[column]):
             raise ExneatError(f"{path}: damaged: expected numbers in a column {column}")
     return table
+
+
+def few_runs_sentence(groups: Iterable[int]) -> str:
+    """Warn if the smallest of the compared groups of runs has fewer than ten; else say nothing."""
+    if min(groups, default=ENOUGH_RUNS) >= ENOUGH_RUNS:
+        return ""
+    return f"Intervals are too narrow below {ENOUGH_RUNS} runs, and a single run has none."
+
+
+def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
+    """Say whether variants had equal budgets, and how many environment steps each took.
+
+    Variants are compared within each of `places`, tables of `Study.spent_in`. Episodes are what a budget sets; steps
+    follow from how long a variant's episodes last, so variants with equal budgets differ in them.
+    """
+    spent = pd.concat(places) if places else pd.DataFrame()
+    if spent.empty:
+        return "No run has spent anything on training."
+    by_variant = spent.groupby("variant", sort=False)
+    compared = [place["episodes"].nunique() for place in places if place["variant"].nunique() > 1]
+    if not compared:
+        verdict = "No two variants have finished runs of the same condition, so there are no budgets to compare"
+    elif max(compared) == 1:
+        verdict = f"All variants had equal budgets of {number_range(spent['episodes'])} training episodes per run"
+    else:
+        each = "; ".join(f"{variant} {number_range(counts)}" for variant, counts in by_variant["episodes"])
+        verdict = f"The variants had unequal budgets of training episodes per run ({each})"
+    means = "; ".join(f"{variant} {steps:,.0f}" for variant, steps in by_variant["env_steps"].mean().items())
+    return f"{verdict}; environment steps per run, on average: {means}."
+
+
+def number_range(counts: Iterable[float]) -> str:
+    """The lowest and the highest as whole numbers, e.g. ``3 to 10``; one number where they are equal."""
+    low, high = min(counts), max(counts)
+    return f"{low:,.0f}" if low == high else f"{low:,.0f} to {high:,.0f}"

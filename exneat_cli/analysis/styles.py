@@ -6,7 +6,7 @@ Variants have colours that colour-blind readers can tell apart, and shapes for g
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -65,19 +65,14 @@ _BASELINES = {
 _MORE_BASELINES = [_look("#7a7a7a", "", line) for line in (":", "-.", _DASH_DOT_DOT)]
 
 
-def variant_styles(variants: Iterable[str], baselines: Iterable[str] = ()) -> dict[str, Look]:
-    """Choose the look of each variant.
+def variant_styles(variants: Collection[str], baselines: Collection[str] = ()) -> dict[str, Look]:
+    """Choose the look of each of an experiment's `variants`; `baselines` among them are grey lines without markers.
 
     Variants of the thesis have a look of their own. Others take, in their order, the first colour that no
     variant of the same experiment has yet, and start over when all are taken.
-
-    Args:
-        variants: names, baselines included, in the order of the experiment.
-        baselines: names of those that nothing trains; they are grey lines without markers.
     """
-    names, untrained = list(variants), set(baselines)
-    trained = _chosen([name for name in names if name not in untrained], _TRAINED, _MORE_TRAINED)
-    return trained | _chosen([name for name in names if name in untrained], _BASELINES, _MORE_BASELINES)
+    trained = _chosen([name for name in variants if name not in baselines], _TRAINED, _MORE_TRAINED)
+    return trained | _chosen([name for name in variants if name in baselines], _BASELINES, _MORE_BASELINES)
 
 
 def _chosen(names: Sequence[str], known: Mapping[str, Look], others: Sequence[Look]) -> dict[str, Look]:
@@ -106,10 +101,11 @@ def save_figure(figure: Figure, path: Path) -> list[Path]:
         ExneatError: they cannot be written.
     """
     make_directory(path.parent)
-    written = [path.with_name(f"{path.name}.{kind}") for kind in _METADATA]
-    for target, (kind, metadata) in zip(written, _METADATA.items(), strict=True):
+    written = []
+    for kind, metadata in _METADATA.items():
         buffer = io.BytesIO()
         with style():
             figure.savefig(buffer, format=kind, metadata=metadata, dpi=150)
-        write_whole(target, buffer.getvalue())
+        written.append(path.with_name(f"{path.name}.{kind}"))
+        write_whole(written[-1], buffer.getvalue())
     return written

@@ -7,16 +7,15 @@ beside what was published; a comparison with the quantities side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
 from exneat_cli.analysis.statistics import compare, efficiency, mean
-from exneat_cli.analysis.study import BEST, MissingRunsError, Study
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence, number_range
 from exneat_cli.errors import check_choice
 from exneat_cli.records import make_directory, write_whole
 
@@ -27,6 +26,12 @@ _SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
 LARGE = 10.0
 """Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
 _PLACE = ["condition", "variant", "quantity", "published"]
+_MEANINGS = {
+    "training": "final best so far",
+    "test": "the champion on test episodes",
+    "robustness": "the champion at one level of a sweep",
+    "full_reward": "on test episodes, with the rewards and costs that training leaves out",
+}
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
@@ -40,19 +45,17 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     of = {column.of for column in plan.columns.values()}
     sentences: list[str] = []
     for experiment, own in lines.groupby("experiment", sort=False):
-        sentences += table_sentences(studies[str(experiment)], own, of)
-    best = {}
+        sentences += _sentences(studies[str(experiment)], own, of)
+    headings = {name: name for name in _PLACE} | {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM"}
     if "robustness" in of:
-        best = {"best_5": f"ours, best {BEST}"}
+        headings["best_5"] = f"ours, best {BEST}"
         mean_of_best = f"mean over the {BEST} runs that are best on validation, or all if there are fewer."
         sentences.append(f"Best {BEST}: {mean_of_best}")
-    ours = {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM", **best}
-    headings = {**dict(zip(_PLACE, _PLACE, strict=True)), **ours, "runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
+    headings |= {"runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
     labelled = _labelled(lines, studies)
-    exact = labelled[[*_PLACE, *STATISTICS, "runs", "p_holm", "a12"]]
-    is_number = lines["efficiency"] == ""
-    exact = exact.assign(mean=lines["mean"].astype(object).where(is_number, lines["efficiency"]))
-    cells = _printed(labelled)[list(headings)].set_axis(list(headings.values()), axis=1)
+    means = lines["mean"].astype(object).where(lines["efficiency"] == "", lines["efficiency"])
+    exact = labelled.assign(mean=means)[[*_PLACE, *STATISTICS, "runs", "p_holm", "a12"]]
+    cells = _printed(labelled)[list(headings)].rename(columns=headings)
     caption = " ".join(filter(None, [*sentences, plan.note]))
     return _write(directory, Built(plan.name, plan.title, caption, ()), exact, cells)
 
@@ -68,13 +71,11 @@ def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFram
         place = (row.experiment, row.condition, row.variant)
         rows += [(*place, name, str(row.published.get(name, ""))) for name in plan.columns]
     planned = pd.DataFrame(rows, columns=[*_KEY, "published"])
+    summaries = []
     for (experiment, condition), own in planned.groupby(["experiment", "condition"], sort=False):
         study = studies[str(experiment)]
         study.require(str(condition), dict.fromkeys([study.first_variant, *own["variant"]]))
-    summaries = [
-        _summary(studies[str(experiment)], own["condition"].unique(), plan.columns)
-        for experiment, own in planned.groupby("experiment", sort=False)
-    ]
+        summaries.append(_summary(study, str(condition), plan.columns))
     lines = planned.merge(pd.concat(summaries), on=_KEY, how="left")
     swept = [name for name, column in plan.columns.items() if column.of == "robustness"]
     unmeasured = lines[lines["quantity"].isin(swept) & (lines["runs"] == 0)]
@@ -100,20 +101,48 @@ def build_comparison(study: Study, directory: Path) -> Built:
     conditions = [name for name in study.conditions if (study.results["condition"] == name).any()]
     measured = ["training", "test", *(["full_reward"] if study.has_full_reward else [])]
     columns = {name: Column(of=name) for name in (*measured, "efficiency")}
-    exact = [("runs", "efficiency", "runs")]
-    exact += [(f"{name}_{each}", name, each) for name in measured for each in STATISTICS if each != "best_5"]
-    exact += [(f"test_{each}", "test", each) for each in ("p_holm", "a12")]
-    exact += [("efficiency", "efficiency", "efficiency")]
-    shown = [("runs", "efficiency", "runs")]
+    exact, shown = [("runs", "efficiency", "runs")], [("runs", "efficiency", "runs")]
     for name in measured:
+        exact += [(f"{name}_{each}", name, each) for each in STATISTICS if each != "best_5"]
         shown += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
+    exact += [("test_p_holm", "test", "p_holm"), ("test_a12", "test", "a12")]
+    exact += [("efficiency", "efficiency", "efficiency")]
     shown += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
     shown += [("efficiency", "efficiency", "mean")]
-    lines = _summary(study, conditions, columns)
+    lines = pd.concat([_summary(study, condition, columns) for condition in conditions], ignore_index=True)
     labelled = _labelled(lines, {study.experiment: study})
     name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
-    words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
+    words = Built(name, title, " ".join(filter(None, _sentences(study, lines, columns))), ())
     return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
+
+
+def _sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
+    """What a table rests on and what its columns, some of `QUANTITIES`, mean.
+
+    `lines` are those of the study's summary that it shows, maybe with a column ``published``.
+    """
+    conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
+    is_published = "published" in lines and bool((lines["published"] != "").any())
+    first = study.variants[study.first_variant]
+    counts = {variant: [len(study.of(condition, variant)) for condition in conditions] for variant in variants}
+    # Labels of variants may hold commas.
+    listed = "; ".join(f"{study.variants[variant]} {number_range(runs)}" for variant, runs in counts.items())
+    yield f"Budget {study.budget}; finished runs per condition: {listed}."
+    if is_published and study.budget != "paper":
+        yield "The published figures rest on a larger budget."
+    if meanings := [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]:
+        yield f"{'; '.join(meanings).capitalize()}."
+    if study.fitness_name != "fitness":
+        yield f"Fitness is {study.fitness_name}."
+    yield "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean."
+    yield few_runs_sentence(lines.loc[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0), "runs"])
+    yield f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition."
+    yield f"A12: chance that a run of the variant beats a run of {first}, a tie counting half."
+    if "efficiency" in quantities:
+        reached = "first generation, counted from 1, at which the mean best so far reaches the final mean of"
+        yield f"Efficiency: {reached} {first}."
+        yield "Published efficiencies are not exactly comparable." if is_published else ""
+    yield budget_sentence([study.spent_in(condition, variants) for condition in conditions])
 
 
 def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) -> pd.DataFrame:
@@ -162,59 +191,47 @@ def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFra
     make_directory(directory)
     paths = directory / f"{words.name}.csv", directory / f"{words.name}.md"
     write_whole(paths[0], exact.to_csv(index=False, lineterminator="\n"))
-    lines = [f"# {words.name}: {words.title}", "", *map(_line, (header, ["---"] * len(header), *rows))]
-    write_whole(paths[1], "\n".join([*lines, "", words.caption, ""]))
+    lines = [
+        "| " + " | ".join(" ".join(text.split()).replace("|", "\\|") for text in texts) + " |"
+        for texts in (header, ["---"] * len(header), *rows)
+    ]
+    write_whole(paths[1], "\n".join([f"# {words.name}: {words.title}", "", *lines, "", words.caption, ""]))
     return words._replace(paths=paths, header=header, rows=rows)
 
 
-def _line(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"
-
-
-def _summary(study: Study, conditions: Iterable[str], columns: Mapping[str, Column]) -> pd.DataFrame:
-    """One row per condition, quantity and variant of the study, which are compared within each condition.
+def _summary(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
+    """One row per quantity and variant of the study, which are compared within the condition.
 
     Columns: `_SUMMARY`; best_5 is the mean over the `BEST` runs best on validation, of robustness alone. Rows of
     efficiency, which is a text, count all finished runs and have no statistics.
     """
     parts = []
-    for condition in conditions:
-        measured = _measured(study, condition, columns)
-        for name, column in columns.items():
-            if column.of == "efficiency":
-                runs = {variant: len(study.of(condition, variant)) for variant in study.variants}
-                part = pd.DataFrame({"runs": runs, "efficiency": _efficiencies(study, condition)})
-            else:
-                groups = {variant: runs.droplevel(0) for variant, runs in measured[name].dropna().groupby(level=0)}
-                values = {variant: groups.get(variant, pd.Series(dtype=float)) for variant in study.variants}
-                part = compare({variant: each.to_numpy() for variant, each in values.items()}, study.baselines)
-                part["efficiency"] = ""
-                if column.of == "robustness":
-                    part["best_5"] = [_mean_of_best(study, condition, *each) for each in values.items()]
-            place = {"experiment": study.experiment, "condition": condition, "quantity": name}
-            parts.append(part.rename_axis("variant").reset_index().assign(**place))
+    for name, column in columns.items():
+        if column.of == "efficiency":
+            counts = {variant: len(study.of(condition, variant)) for variant in study.variants}
+            part = pd.DataFrame({"runs": counts, "efficiency": _efficiencies(study, condition)})
+        else:
+            values = _values(study, condition, column)
+            part = compare({variant: list(runs.values()) for variant, runs in values.items()}, study.baselines)
+            part["efficiency"] = ""
+            if column.of == "robustness":
+                best = [(study.best_seeds(condition, variant, runs), runs) for variant, runs in values.items()]
+                part["best_5"] = [mean([runs[seed] for seed in seeds]) for seeds, runs in best]
+        place = {"experiment": study.experiment, "condition": condition, "quantity": name}
+        parts.append(part.rename_axis("variant").reset_index().assign(**place))
     return pd.concat(parts, ignore_index=True).reindex(columns=_SUMMARY)
 
 
-def _measured(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
-    """One row per finished run, indexed by variant and seed; one column per quantity, NaN where a run has none."""
-    results = study.results[study.results["condition"] == condition].set_index(["variant", "seed"])
-    measured = pd.DataFrame(index=results.index)
-    if any(column.of == "robustness" for column in columns.values()):
-        swept = study.robustness(condition).set_index(["variant", "seed"])
-    for name, column in columns.items():
-        if column.of == "robustness":
-            level = np.isclose(swept["level"].astype(float), float(column.level or 0.0))
-            here = swept.loc[level & (swept["parameter"] == column.sweep), f"{column.value}_mean"]
-            measured[name] = here[~here.index.duplicated(keep="last")].astype(float)
-        elif column.of != "efficiency":
-            measured[name] = results[column.of]
-    return measured
-
-
-def _mean_of_best(study: Study, condition: str, variant: str, values: pd.Series) -> float:
-    best = [values[run.seed] for run in study.best_first(condition, variant) if run.seed in values]
-    return mean(best[:BEST])
+def _values(study: Study, condition: str, column: Column) -> dict[str, dict[int, float]]:
+    """What the finished runs of each variant reached, by seed; those that lack the figure are left out."""
+    name = column.of
+    rows = study.results[study.results["condition"] == condition]
+    if column.of == "robustness":
+        name, rows = f"{column.value}_mean", study.robustness(condition)
+        is_level = np.isclose(rows["level"].astype(float), float(column.level or 0.0))
+        rows = rows[is_level & (rows["parameter"] == column.sweep)]
+    rows = rows.dropna(subset=name)
+    return {v: dict(rows.loc[rows["variant"] == v, ["seed", name]].itertuples(index=False)) for v in study.variants}
 
 
 def _efficiencies(study: Study, condition: str) -> dict[str, str]:
@@ -223,10 +240,9 @@ def _efficiencies(study: Study, condition: str) -> dict[str, str]:
     E.g. ``7``, ``>20`` if 20 were not enough, or nothing if the variant or the first one has no curve.
     """
     best = study.history(condition).groupby(["variant", "generation"])["best_so_far"].mean()
-    curves = {variant: curve.to_numpy() for variant, curve in best.groupby("variant")}
+    curves = {str(variant): curve.to_numpy() for variant, curve in best.groupby("variant")}
     found = dict.fromkeys(study.variants, "")
     if study.first_variant in curves:
         target = float(curves[study.first_variant][-1])
-        for variant, curve in curves.items():
-            found[str(variant)] = str(efficiency(curve, target) or f">{len(curve)}")
+        found |= {v: str(efficiency(curve, target) or f">{len(curve)}") for v, curve in curves.items()}
     return found

@@ -133,8 +133,7 @@ def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
     tests = shared_episodes("test", episodes)
     if settings.algorithm.rule != "random":
         return tests
-    root = settings.seed
-    return [(world, noise, stream(root, "random_actions", k)) for k, (world, noise, _) in enumerate(tests)]
+    return [each._replace(actions=stream(settings.seed, "random_actions", k)) for k, each in enumerate(tests)]
 
 
 def robustness_row(settings: RunSettings, parameter: str, level: float, score: Score) -> RobustnessRow:

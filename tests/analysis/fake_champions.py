@@ -7,7 +7,6 @@ from typing import Any
 
 import msgspec
 
-from exneat_cli.analysis.network_data import ChampionGraph, champion_graph
 from exneat_cli.records import Champion
 
 
@@ -60,9 +59,9 @@ def a_score(fitness: float, full_reward: float) -> dict[str, Any]:
     return {"episodes": 20, **means, "fitness_std": 0.1, "full_reward_std": 0.1, "failed_episodes": 0, "fitness": []}
 
 
-def graph_of(content: dict[str, Any]) -> ChampionGraph:
-    """The graph of what champion.json would hold."""
-    return champion_graph(msgspec.convert(content, Champion))
+def champion_of(content: dict[str, Any]) -> Champion:
+    """What reading champion.json would give."""
+    return msgspec.convert(content, Champion)
 
 
 def grid_champion() -> dict[str, Any]:

@@ -13,16 +13,15 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
-from exneat_cli.analysis.network_data import ChampionGraph, Edge
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
-from exneat_cli.analysis.network_layout import depths, lay_out, natural_size
+from exneat_cli.analysis.network_layout import depths, edges_of, hidden_of, lay_out, links_of, natural_size, used_nodes
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, write_json
+from exneat_cli.records import Champion, RunDirectory, write_json
 from tests.analysis.fake_champions import (
     a_champion,
     a_genome,
     a_module,
-    graph_of,
+    champion_of,
     grid_champion,
     modular_champion,
     reads,
@@ -33,7 +32,9 @@ FRONT_LEFT, FRONT_RIGHT, BACK_LEFT, BACK_RIGHT, CENTRAL = range(5)
 
 
 def layered(hidden: list[int], *connections: tuple[int, int]) -> dict[int, int]:
-    return depths(hidden, [Edge(source, target, 1.0) for source, target in connections])
+    """The layers of the hidden nodes of one module."""
+    edges = [((0, source), (0, target), 1.0) for source, target in connections]
+    return {key: layer for (_, key), layer in depths([(0, key) for key in hidden], edges).items() if key >= 0}
 
 
 def test_a_hidden_node_stands_one_layer_above_its_deepest_source() -> None:
@@ -49,32 +50,32 @@ def test_a_cycle_is_entered_where_inputs_reach_it() -> None:
 
 
 def laid_out(content: dict[str, Any]) -> Any:
-    graph = graph_of(content)
-    return lay_out(graph, *natural_size(graph))
+    champion = champion_of(content)
+    return lay_out(champion, *natural_size(champion))
 
 
 def test_layers_rise_from_inputs_to_outputs_and_step_aside_for_connections_that_pass_them() -> None:
-    _, (places,) = laid_out(grid_champion())
-    assert all(places[low][1] < places[high][1] for low, high in pairwise((-1, 2, 3, 0)))
-    assert places[-1][1] == places[-2][1]
-    assert places[0][1] == places[1][1]
+    _, places = laid_out(grid_champion())
+    assert all(places[0, low][1] < places[0, high][1] for low, high in pairwise((-1, 2, 3, 0)))
+    assert places[0, -1][1] == places[0, -2][1]
+    assert places[0, 0][1] == places[0, 1][1]
     # The second input feeds output 1 directly, straight through where the faint node 4 would stand.
-    assert places[-2][0] == pytest.approx(places[1][0])
-    assert abs(places[4][0] - places[1][0]) > 0.08
+    assert places[0, -2][0] == pytest.approx(places[0, 1][0])
+    assert abs(places[0, 4][0] - places[0, 1][0]) > 0.08
 
 
 @pytest.mark.parametrize("content", [grid_champion(), modular_champion()], ids=["grid", "modular"])
 def test_every_node_stands_inside_the_box_of_its_module(content: dict[str, Any]) -> None:
-    graph = graph_of(content)
+    champion = champion_of(content)
     boxes, places = laid_out(content)
-    for m, module in enumerate(graph.plan.modules):
-        assert len(places[m]) == len(module.pins) + module.outputs + len(graph.hidden[m])
-        assert all(boxes[m].contains(*place) for place in places[m].values())
+    shown = [(m, key) for m, each in enumerate(champion.plan.modules) for key in range(-len(each.pins), each.outputs)]
+    assert set(places) == {*shown, *hidden_of(champion)}
+    assert all(boxes[m].contains(*place) for (m, _), place in places.items())
 
 
 def test_a_node_is_used_on_a_path_from_a_sensor_to_an_actuator_by_way_of_any_module() -> None:
-    assert graph_of(grid_champion()).used == {(0, key) for key in (-1, -2, 0, 1, 2, 3)}
-    used = graph_of(modular_champion()).used
+    assert used_nodes(champion_of(grid_champion())) == {(0, key) for key in (-1, -2, 0, 1, 2, 3)}
+    used = used_nodes(champion_of(modular_champion()))
     assert (BACK_RIGHT, 0) not in used, "nothing reads its output"
     assert (BACK_RIGHT, 1) in used, "the back left leg reads its hidden node"
     assert all((leg, 0) in used for leg in (FRONT_LEFT, FRONT_RIGHT, BACK_LEFT))
@@ -83,21 +84,21 @@ def test_a_node_is_used_on_a_path_from_a_sensor_to_an_actuator_by_way_of_any_mod
 def test_a_disabled_connection_is_neither_drawn_nor_a_path() -> None:
     content = grid_champion()
     content["genomes"][0]["connections"][0]["enabled"] = False
-    graph = graph_of(content)
-    assert all(edge.source != -1 for edge in graph.edges[0])
-    assert graph.used == {(0, -2), (0, 1)}
+    champion = champion_of(content)
+    assert all(source != (0, -1) for source, _, _ in edges_of(champion))
+    assert used_nodes(champion) == {(0, -2), (0, 1)}
 
 
 def test_links_run_between_the_modules_that_the_plan_names_unless_the_node_was_deleted() -> None:
     content = modular_champion()
-    links = graph_of(content).links
-    delayed = {(link.source, link.target) for link in links if link.delayed}
-    prompt = {(link.source, link.target) for link in links if not link.delayed}
+    links = links_of(champion_of(content))
+    delayed = {(source, target) for source, target, is_delayed in links if is_delayed}
+    prompt = {(source, target) for source, target, is_delayed in links if not is_delayed}
     # Each leg's third pin reads the hidden node of the next leg, which is node 1.
     assert delayed == {(((k + 1) % 4, 1), (k, -3)) for k in range(4)}
     assert prompt == {((leg, 0), (CENTRAL, -2 - leg)) for leg in range(3)}
     content["genomes"][0] = a_genome([0], [(-1, 0, 0.5)])
-    assert not any(link.delayed for link in graph_of(content).links)
+    assert not any(is_delayed for _, _, is_delayed in links_of(champion_of(content)))
 
 
 def test_modules_stand_on_the_page_as_on_the_body() -> None:
@@ -119,14 +120,14 @@ def test_the_parts_of_a_map_keep_its_directions() -> None:
     assert down[1] < left[1] == right[1] < up[1]
 
 
-def axes_of(graph: ChampionGraph) -> Axes:
+def axes_of(champion: Champion) -> Axes:
     axes = Figure().add_subplot()
-    draw_champion(axes, graph, *natural_size(graph))
+    draw_champion(axes, champion, *natural_size(champion))
     return axes
 
 
 def test_colour_tells_the_sign_width_the_size_and_faintness_the_unused() -> None:
-    axes = axes_of(graph_of(grid_champion()))
+    axes = axes_of(champion_of(grid_champion()))
     (edges,) = [each for each in axes.collections if isinstance(each, LineCollection)]
     # Lightest first: 0.3, -0.5, 1.0 (unused), -1.0, 1.5 and 2.0; the connection to itself is a loop.
     colours = [POSITIVE, NEGATIVE, POSITIVE, NEGATIVE, POSITIVE, POSITIVE]
@@ -139,7 +140,7 @@ def test_colour_tells_the_sign_width_the_size_and_faintness_the_unused() -> None
 
 
 def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_their_names() -> None:
-    axes = axes_of(graph_of(modular_champion()))
+    axes = axes_of(champion_of(modular_champion()))
     links = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
     assert [link.get_linestyle() == "-" for link in links] == [False] * 4 + [True] * 3
     texts = {text.get_text() for text in axes.texts}
@@ -149,7 +150,7 @@ def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_th
 
 def test_the_legend_speaks_of_links_and_loops_only_where_there_are_any() -> None:
     grid, modular = (
-        " ".join(str(entry.get_label()) for entry in legend_entries([graph_of(content)]))
+        " ".join(str(entry.get_label()) for entry in legend_entries([champion_of(content)]))
         for content in (grid_champion(), modular_champion())
     )
     assert "link" not in grid

@@ -7,6 +7,7 @@ import math
 import random
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -68,14 +69,14 @@ def test_p_without_ties_is_the_share_of_orders_at_least_as_far_apart(order: list
 
 
 def test_holm_corrects_a_case_worked_out_by_hand() -> None:
-    corrected = holm([0.01, 0.04, math.nan, 0.03, 0.5])
+    corrected = holm(pd.Series([0.01, 0.04, math.nan, 0.03, 0.5]))
     np.testing.assert_allclose(corrected, [0.04, 0.09, math.nan, 0.09, 0.5])
-    assert not len(holm([]))
+    assert holm(pd.Series([], dtype=float)).empty
 
 
 @given(P_VALUES)
 def test_holm_lies_between_no_correction_and_bonferroni_and_keeps_the_order(p_values: list[float]) -> None:
-    corrected = holm(p_values)
+    corrected = holm(pd.Series(p_values))
     for p, q in zip(p_values, corrected, strict=True):
         assert p <= q <= min(1.0, len(p_values) * p)
     assert min(corrected) == min(1.0, len(p_values) * min(p_values))
@@ -100,7 +101,7 @@ def test_every_variant_is_compared_with_the_first_and_those_that_learn_are_corre
     low, middle, high = [0.1, 0.2, 0.3], [0.15, 0.25, 0.35], [0.7, 0.8, 0.9]
     found = compare({"neat": low, "single": middle, "all": high, "random": [0.0]}, untrained=("random",))
     alone = [mann_whitney_p(variant, low) for variant in (middle, high)]
-    np.testing.assert_allclose(found["p_holm"], [math.nan, *holm(alone), math.nan])
+    np.testing.assert_allclose(found["p_holm"], [math.nan, *holm(pd.Series(alone)), math.nan])
     assert found.loc["all", "p_holm"] == pytest.approx(2 * 0.1)
     np.testing.assert_allclose(found["a12"], [math.nan, 6 / 9, 1.0, 0.0])
     assert list(found["runs"]) == [3, 3, 3, 1]

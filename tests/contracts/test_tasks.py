@@ -150,7 +150,7 @@ def test_a_trace_never_depends_on_what_the_runner_did_before(task: Task) -> None
 
 
 def test_random_episodes_report_sensible_figures(task: Task) -> None:
-    episodes = [(*seeds[:2], stream(9, "random_actions", k)) for k, seeds in enumerate(training_episodes(3, 0, 20))]
+    episodes = [e._replace(actions=stream(9, "random_actions", k)) for k, e in enumerate(training_episodes(3, 0, 20))]
     outcomes = run(task, None, episodes, std=0.1, training=False)
     assert outcomes.fitness.shape == (1, 20)
     assert not outcomes.failed.any()
