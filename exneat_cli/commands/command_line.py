@@ -51,7 +51,8 @@ class CommandLine:
         """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
 
         Raises:
-            ExneatError: they do not fit together, or a key or what a value refers to is not there.
+            ExneatError: they do not fit together, a key or what a value refers to is not there, or a file in
+                ``--config-path``, such as the config.yaml of somebody's run, names code that the command line does not.
         """
         with self.composed() as config:
             try:
@@ -62,6 +63,10 @@ class CommandLine:
         for key in keys:
             if key not in plain:
                 raise ExneatError(f"{key}: is missing")
+        if self.directories[0] != shipped_directory("conf") and not self.shown:
+            from exneat_cli.tasks import refuse_code  # takes longer to import than --help to answer
+
+            refuse_code(plain.get("task"), [text.lstrip("+").partition("=")[0] for text in self.settings])
         return {str(key): value for key, value in plain.items()}
 
     @contextlib.contextmanager

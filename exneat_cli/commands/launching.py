@@ -23,7 +23,7 @@ from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import as_worker, launching, signal_heard
-from exneat_cli.rollouts import keep_clusters
+from exneat_cli.rollouts import keep_workers
 
 _WRITING_NOTHING = (
     *("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null"),
@@ -44,7 +44,7 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
         ExneatError: there is no such launcher, or it gave up; some jobs may be done by then.
     """
     if not line.launcher:
-        with keep_clusters():  # starting one takes seconds
+        with keep_workers():  # starting one takes seconds
             return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
     with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
         here = functools.partial(_do_here, Path.cwd(), functools.partial(_do, work, jobs, Path(workplace)))

@@ -11,17 +11,19 @@ from collections.abc import Mapping, Sequence
 from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
-from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.tasks import refuse_code
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
-    """The settings of a finished run, from its own config.yaml.
+    """The settings of a finished run, from its own config.yaml, which may name no code that is not imported yet.
 
     Raises:
-        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged.
+        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged or would
+            import code.
     """
     where = f"run={directory.path}"
     if not directory.is_there():
@@ -31,7 +33,9 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         fix = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
-        settings = RunSettings.from_plain(read_yaml(directory.config))
+        plain = read_yaml(directory.config)
+        refuse_code(plain.get("task"))
+        settings = RunSettings.from_plain(plain)
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
     if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):
@@ -70,7 +74,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
                 raise ConfigError(key, expected, came, fix) from error
 
 
-@keep_clusters()
+@keep_workers()
 def run_robustness(
     directory: RunDirectory,
     sweeps: Sequence[Sweep],

@@ -26,7 +26,7 @@ from exneat_cli.records import (
     write_checkpoint,
     write_history,
 )
-from exneat_cli.rollouts import Runner, keep_clusters
+from exneat_cli.rollouts import Runner, keep_workers
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
@@ -44,7 +44,7 @@ class Finished:
     trained_now: bool
 
 
-@keep_clusters()
+@keep_workers()
 def train(
     settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:

@@ -122,6 +122,9 @@ class RunSettings:
     def _identity(self) -> dict[str, Any]:
         """What is hashed: the settings with defaults that depend on the task spelled out."""
         plain = self.to_plain()
+        for key, value in plain["task"].items():
+            if isinstance(value, dict):  # the order of parts counts, since geometry vectors go by it
+                plain["task"][key] = list(value.items())
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))
@@ -129,7 +132,7 @@ class RunSettings:
 
     def to_plain(self) -> dict[str, Any]:
         """The settings as dicts, lists, tuples, numbers and strings; `from_plain` reads them back."""
-        return asdict(self)
+        return {**asdict(self), "task": self.task.to_plain()}
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> RunSettings:

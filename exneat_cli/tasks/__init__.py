@@ -5,9 +5,11 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
+from exneat_cli.tasks.code import import_code, refuse_code
 from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.world import GridTask
+from exneat_cli.tasks.gym import GymTask
 from exneat_cli.tasks.robots.ant import AntTask
 from exneat_cli.tasks.task import (
     ENDED,
@@ -27,6 +29,7 @@ TASKS: dict[str, type[Task]] = {
     "general_maze": GeneralMaze,
     "foraging": Foraging,
     "hunting": Hunting,
+    "gym": GymTask,
 }
 """Every task by the name it has in `conf/task`."""
 
