@@ -29,6 +29,7 @@ PATIENCE_SECONDS = 60.0
 CONNECT_SECONDS = 8
 """How long to wait for the scheduler at an address."""
 
+
 class Cluster:
     """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files."""
 

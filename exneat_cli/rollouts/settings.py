@@ -67,7 +67,7 @@ class Executor:
 
 
 def is_compiled(task: Task) -> bool:
-    """Whether episodes of a task run in compiled code, which threads speed up; plain Python needs processes for that."""
+    """Whether episodes of a task run in compiled code, which threads speed up; plain Python needs processes."""
     return task.open(training=False).compiled
 
 

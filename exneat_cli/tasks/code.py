@@ -1,4 +1,4 @@
-"""Code that a task's settings name: only who runs exneat may have it imported, never a file that somebody else wrote."""
+"""Code that a task's settings name: only who runs exneat may have it imported, no file that somebody else wrote."""
 
 from __future__ import annotations
 

@@ -103,9 +103,12 @@ def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymna
 
 def _unknown(env_id: str) -> ConfigError:
     close = difflib.get_close_matches(env_id.rpartition(":")[2], gymnasium.registry, n=1, cutoff=0.5)
-    fix = f"did you mean {close[0]}?" if close else "python -c 'import gymnasium; gymnasium.pprint_registry()' lists them"
+    fix = (
+        f"did you mean {close[0]}?" if close else "python -c 'import gymnasium; gymnasium.pprint_registry()' lists them"
+    )
     return ConfigError("task.env_id", "the id of a registered environment, with its version", env_id, fix)
 
 
 def in_words(error: Exception) -> str:
+    """An error of any code in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]

@@ -1,7 +1,7 @@
 """Any Gymnasium environment that gives a Box of numbers and takes a Box of numbers or one of several actions.
 
-It runs in plain Python, which is slower than the compiled tasks. Its observation, of whatever shape, is laid out flat in
-C order, and so is a Box of actions:
+It runs in plain Python, which is slower than the compiled tasks. Its observation, of whatever shape, is laid out flat
+in C order, and so is a Box of actions:
 
 | action space | entries of our action | meaning |
 |---|---|---|
@@ -39,7 +39,7 @@ from exneat_cli.tasks.environments import Interface, in_words, interface_of, mak
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task, setting
 
 LARGEST = 2**25
-"""Readings of a longest episode, 256 MiB: sensor noise needs room for all of them."""
+"""Readings, or entries of actions, in a longest episode, 256 MiB: noise needs room for all of them."""
 _OURS = ("id", "max_episode_steps", "disable_env_checker")
 _ABOUT_THE_ACTION = (ArithmeticError, AssertionError, ValueError, gymnasium.error.InvalidAction, mujoco.FatalError)
 """What environments raise over an action that they cannot take, or a state that it has led to."""
@@ -83,7 +83,8 @@ class GymTask(Task):
         elif self._interface.max_steps is None:
             fix = f"{self.env_id} has no limit of its own"
             raise ConfigError("task.max_steps", "a whole number from 1 to 1000000", None, fix)
-        check_whole("task.max_steps", self.longest_episode, 1, LARGEST // self.observation_size)
+        largest = max(self.observation_size, len(self.actuator_names))
+        check_whole("task.max_steps", self.longest_episode, 1, LARGEST // largest)
         if self.part_entries is not None:
             _check_parts(self.part_entries, self.observation_size, len(self.actuator_names))
 

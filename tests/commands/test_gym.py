@@ -18,7 +18,9 @@ from tests.commands.refusals import check_refusal
 from tests.torture.small_runs import difference, results
 
 SMALL = ["task=gym", "budget=smoke", "task.max_steps=60", "population=8"]
-TWO_LEGS = "task.parts={back: {sensors: [2, 3, 4], actuators: [0, 1, 2]}, front: {sensors: [5, 6, 7], actuators: [3, 4, 5]}}"
+TWO_LEGS = (
+    "task.parts={back: {sensors: [2, 3, 4], actuators: [0, 1, 2]}, front: {sensors: [5, 6, 7], actuators: [3, 4, 5]}}"
+)
 ENVIRONMENTS = {
     "CartPole-v1": [],
     "Pendulum-v1": ["algorithm=neat"],
@@ -121,7 +123,11 @@ def test_a_run_directory_never_has_code_imported(loud: Path, capfd: pytest.Captu
         check_refusal(refused, [], loud.parents[2], capfd)
         assert "exneat_loud" not in sys.modules
     check_refusal(["evaluate", f"run={loud}", *sweep], [REFUSED, f"add {NAMED} to the command line"], loud, capfd)
-    for harmless in (["inspect", f"run={loud}"], ["inspect", "output=out"], ["train", "--config-path", str(loud), "--help"]):
+    for harmless in (
+        ["inspect", f"run={loud}"],
+        ["inspect", "output=out"],
+        ["train", "--config-path", str(loud), "--help"],
+    ):
         assert main(harmless) == 0
         assert "imported" not in capfd.readouterr().out
     assert main(["report", "output=out"]) == 2

@@ -17,7 +17,6 @@ import pytest
 
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Executor, keep_workers
-from exneat_cli.rollouts.workers import workers_of
 from exneat_cli.tasks import AntTask, Task
 from exneat_cli.tasks.gym import GymTask
 from tests.rollouts.drifting import SERIAL, Drifting, assert_equal, random_brains, run
@@ -88,7 +87,11 @@ class Raising(Drifting):
 @pytest.mark.parametrize(
     ("task", "error", "message"),
     [
-        (Lethal(compiled=False), ExneatError, "gave up: one worker after the other died over the same brains\n  resume"),
+        (
+            Lethal(compiled=False),
+            ExneatError,
+            "gave up: one worker after the other died over the same brains\n  resume",
+        ),
         (Raising(compiled=False), RuntimeError, "ZeroDivisionError: by nothing"),
     ],
 )
@@ -108,7 +111,7 @@ def test_workers_stay_for_the_next_runner() -> None:
 
 
 def test_an_address_is_none_of_theirs() -> None:
-    with pytest.raises(ConfigError, match="executor.address: expected none with executor=processes"):
+    with pytest.raises(ConfigError, match=r"executor\.address: expected none with executor=processes"):
         Executor("processes", 0, "tcp://a:1")
 
 
