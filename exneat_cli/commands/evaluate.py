@@ -6,8 +6,8 @@ import glob
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import with_sweeps
-from exneat_cli.errors import ConfigError, ExneatError, check_keys
+from exneat_cli.commands.jobs import name_code, with_sweeps
+from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
 from exneat_cli.records import RunDirectory, build
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import load_settings, progress_for_terminal
@@ -20,7 +20,9 @@ def run(line: CommandLine) -> int:
         ExneatError: a run, a sweep or a level is unusable; nothing was run then.
     """
     plain = line.compose()
-    check_keys("", plain, ("run", "sweep", "sweeps", "executor"))
+    check_keys("", plain, ("run", "task", "sweep", "sweeps", "executor"))
+    check_keys("task.", check_section("task", plain["task"]), ("kind",))
+    name_code(line, plain)
     if not plain["sweeps"]:
         raise ConfigError("sweep", "what to perturb, e.g. sweep=sensor_noise", "none")
     executor = build(Executor, plain["executor"], "executor.")

@@ -15,6 +15,7 @@ from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbe
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.tasks.contract import check_worlds
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
@@ -92,6 +93,7 @@ def run_robustness(
     with directory.held():
         settings = load_settings(directory)
         check_sweeps(settings, sweeps, episodes)
+        check_worlds(settings.task)
         acting = _acting(directory, settings)
         for sweep in sweeps:
             levels = missing_levels(directory, sweep, episodes)

@@ -79,7 +79,7 @@ TRAIN = {
     "output=": "output: expected a directory",
     "output=null": "output: expected a directory",
     "output=[a]": "output: expected a directory",
-    "task=atn": "task=atn: no such option; known: ant, foraging, general_maze, hunting, track_maze",
+    "task=atn": "task=atn: no such option; known: ant, custom, foraging, general_maze, hunting, track_maze",
     "task=": "task=: no such option; known: ant",
     "task=null": "task: expected the name of an option, got None",
     "task=3": "task: expected the name of an option, got 3",
