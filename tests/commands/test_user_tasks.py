@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import shutil
 import subprocess
 import sys
@@ -14,7 +13,7 @@ import pytest
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, read_yaml
 from tests.commands.refusals import check_refusal
-from tests.commands.user_modules import CORRIDOR, EXAMPLE, MARK, forget_user_code
+from tests.commands.user_modules import COMPILED, CORRIDOR, EXAMPLE, MARK, forget_user_code
 
 CUSTOM = ["task=custom", "task.kind=walks:Corridor"]
 SMALL = ["budget=smoke", "executor=serial"]
@@ -156,7 +155,8 @@ def test_a_class_that_cannot_be_used_is_refused(
     )
     installed(tmp_path / "one", "corridor = walks:Corridor", "broken = nowhere:Task", package="one")
     installed(tmp_path / "two", "corridor = kinds:Corridor", package="two")
-    check_refusal(["train", "task=custom", *setting.split(), *SMALL], [named], tmp_path, capfd)
+    task = [] if setting.startswith("task=") else ["task=custom"]
+    check_refusal(["train", *task, *setting.split(), *SMALL], [named], tmp_path, capfd)
 
 
 WORLDS = {
@@ -228,31 +228,21 @@ def test_a_run_in_the_place_of_ones_own_imports_nothing_in_sweep_and_report(capf
     assert not Path("imported").exists()
 
 
-@pytest.mark.parametrize(
-    "workers",
-    [
-        ["hydra/launcher=joblib", "hydra.launcher.n_jobs=1"],
-        ["hydra/launcher=submitit_local", "hydra.sweep.dir=jobs"],
-        [],
-    ],
-    ids=["joblib", "submitit", "dask"],
-)
-@pytest.mark.parametrize("way", ["kind", "program", "compiled program"])
+JOBLIB = ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial"]
+SUBMITIT = ["hydra/launcher=submitit_local", "hydra.sweep.dir=jobs", "executor=serial"]
+DASK = ["executor=dask", "executor.workers=1"]
+
+
+@pytest.mark.parametrize("workers", [JOBLIB, SUBMITIT, DASK], ids=["joblib", "submitit", "dask"])
+@pytest.mark.parametrize("way", ["kind", "program", "compiled"])
 def test_workers_know_what_a_user_named_or_a_program_registered(way: str, workers: list[str]) -> None:
     for library in ("hydra_plugins.hydra_joblib_launcher", "hydra_plugins.hydra_submitit_launcher", "distributed"):
         pytest.importorskip(library)
-    text = EXAMPLE.read_text(encoding="utf-8")
-    if way == "compiled program":
-        text = text.replace("\ndef ", "\n@compiled_lean\ndef ").replace("compiled=False", "compiled=True")
-        text = text.replace(
-            "from exneat_cli.main", "from exneat_cli.compiling import compiled_lean\nfrom exneat_cli.main"
-        )
     Path("program").mkdir()
-    Path("program/walk.py").write_text(text, encoding="utf-8")
-    program = [sys.executable, "program/walk.py"] if way != "kind" else [str(Path(sys.executable).parent / "exneat")]
-    chosen = CUSTOM if way == "kind" else ["task=custom", "task.name=corridor"]
-    asked = ["train", "-m", *chosen, "budget=smoke", "seed=0,1", *SWEEP, *workers]
-    asked += ["executor=serial"] if workers else ["executor=dask", "executor.workers=1"]
-    done = subprocess.run([*program, *asked], capture_output=True, text=True, check=False, env=os.environ)
-    assert (done.returncode, done.stderr) == (0, "")
+    Path("program/walk.py").write_text(COMPILED if way == "compiled" else EXAMPLE.read_text(encoding="utf-8"))
+    exneat = [str(Path(sys.executable).parent / "exneat"), "train", *CUSTOM]
+    program = [sys.executable, "program/walk.py", "train", "task=custom", "task.name=corridor"]
+    asked = [*(exneat if way == "kind" else program), "-m", "budget=smoke", "seed=0,1", *SWEEP, *workers]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
     assert [len(run.robustness.read_text().splitlines()) for run in runs_in("outputs")] == [3, 3]
