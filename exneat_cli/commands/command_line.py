@@ -44,6 +44,7 @@ class CommandLine:
     directories: tuple[Path, ...]  # where YAML files are looked for, in this order
     settings: tuple[str, ...]  # key=value, as Hydra's composition takes them
     launcher: tuple[str, ...]  # the same for Hydra's launcher
+    config_path: Path | None  # a directory that comes before all others, such as a run's
     multirun: bool  # whether settings with several values are to be gone through
     shown: str  # help or job if that is all that is asked for, else empty
 
@@ -51,8 +52,7 @@ class CommandLine:
         """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
 
         Raises:
-            ExneatError: they do not fit together, a key or what a value refers to is not there, or a file in
-                ``--config-path``, such as the config.yaml of somebody's run, names code that the command line does not.
+            ExneatError: they do not fit together, or a key or what a value refers to is not there.
         """
         with self.composed() as config:
             try:
@@ -63,10 +63,6 @@ class CommandLine:
         for key in keys:
             if key not in plain:
                 raise ExneatError(f"{key}: is missing")
-        if self.directories[0] != shipped_directory("conf") and not self.shown:
-            from exneat_cli.tasks import refuse_code  # takes longer to import than --help to answer
-
-            refuse_code(plain.get("task"), [text.lstrip("+").partition("=")[0] for text in self.settings])
         return {str(key): value for key, value in plain.items()}
 
     @contextlib.contextmanager
@@ -85,6 +81,13 @@ class CommandLine:
             except Exception as error:  # Hydra and YAML raise errors of many kinds
                 raise ExneatError(in_words(error, self.directories)) from error
             yield config
+
+    def names(self, key: str) -> bool:
+        """Whether the value of a key is the user's own word: that of a setting, or of a file that he chose.
+
+        What ``--config-path`` holds is not: it may be the directory of anybody's run.
+        """
+        return self.config_path is None or any(text.lstrip("+").partition("=")[0] == key for text in self.settings)
 
     def combinations(self) -> dict[str, CommandLine]:
         """Each combination of the settings that have several values, by those values."""
@@ -156,6 +159,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         directories=directories,
         settings=tuple(text for text in read if not _is_hydras(text)),
         launcher=tuple(text for text in read if _is_hydras(text)),
+        config_path=flags.config_path,
         multirun=flags.multirun,
         shown="help" if flags.help else flags.cfg or "",
     )

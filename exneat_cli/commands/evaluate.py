@@ -6,12 +6,11 @@ import glob
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import with_sweeps
+from exneat_cli.commands.jobs import name_code, with_sweeps
 from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
 from exneat_cli.records import RunDirectory, build
 from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
-from exneat_cli.tasks import import_code
 
 
 def run(line: CommandLine) -> int:
@@ -21,13 +20,13 @@ def run(line: CommandLine) -> int:
         ExneatError: a run, a sweep or a level is unusable; nothing was run then.
     """
     plain = line.compose()
-    check_keys("", plain, ("run", "sweep", "sweeps", "executor", "task"))
-    check_keys("task.", check_section("task", plain["task"]), ("env_id",))
+    check_keys("", plain, ("run", "task", "sweep", "sweeps", "executor"))
+    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
+    name_code(line, plain)
     if not plain["sweeps"]:
         raise ConfigError("sweep", "what to perturb, e.g. sweep=sensor_noise", "none")
     where = check_section("executor", plain.get("executor", {}))
     build(Executor, where, "executor.")
-    import_code(plain["task"])
     planned = []
     for directory in _directories(plain["run"]):
         try:

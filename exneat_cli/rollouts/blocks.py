@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import pickle
 import platform
+import sys
 import time
 from importlib.metadata import version
 
@@ -44,8 +45,8 @@ def _slices(count: int, parts: int) -> list[slice]:
 def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tally, float]:
     """Run some brains through some episodes, in a worker; returns what came out, and how many seconds it took.
 
-    Pickled are in `world` task, noise, and whether this is training; in `work` `Acting`, episodes, and whether
-    statistics of what is sensed are wanted.
+    Pickled are in `world` where the process that asks looks for modules, and pickled `Setup`; in `work` `Acting`,
+    episodes, and whether statistics of what is sensed are wanted.
 
     Raises:
         ExneatError: a version differs from what is `expected`, that of the process that asks.
@@ -54,7 +55,9 @@ def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tall
         if (came := versions()[name]) != wanted:
             fix = "install the same on all machines and start the workers again"
             raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {fix}")
-    (task, noise, training), (acting, episodes, moments) = pickle.loads(world), pickle.loads(work)
+    path, setup = pickle.loads(world)
+    sys.path.extend(place for place in path if place not in sys.path)  # a user's task may lie anywhere
+    (task, noise, training), (acting, episodes, moments) = pickle.loads(setup), pickle.loads(work)
     idle = _idle_worlds(world)
     try:
         own = idle.pop()

@@ -11,6 +11,7 @@ import contextlib
 import logging
 import math
 import signal
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -76,7 +77,7 @@ class Cluster:
         (brains, *added), moments = acting, bool(tally[-1].size)
         workers = self._threads() or 1 if self._own is None else self._executor.threads
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
-        world, waiting = dumps(setup), {}
+        world, waiting = dumps((sys.path, dumps(setup))), {}
         pool = self.client.get_executor(pure=False)
         try:
             for some, which in blocks(len(brains.size), len(episodes), workers, max(1, smallest)):

@@ -12,6 +12,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import traceback
 from collections import Counter, deque
@@ -40,6 +41,7 @@ class Processes:
     def __init__(self, executor: Executor) -> None:
         self._executor, self._seconds_per_run = executor, math.inf
         self._workers: list[_Worker] = []
+        self._lock = threading.Lock()
 
     def run(self, setup: Setup, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
         """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
@@ -50,20 +52,21 @@ class Processes:
         (brains, *added), moments = acting, bool(tally[-1].size)
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
         places = blocks(len(brains.size), len(episodes), self._executor.threads, max(1, smallest))
-        world, work = pickle.dumps(setup), []
+        world, work = pickle.dumps((sys.path, pickle.dumps(setup))), []
         for some, which in places:
             work.append(pickle.dumps(((brains.part(some.start, some.stop), *added), list(episodes[which]), moments)))
         pace = math.inf
-        try:
-            for block, (part, seconds) in self._results(world, work):
-                some, which = places[block]
-                for own, values in zip(tally, part, strict=True):
-                    own[which, some] = values
-                pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
-            self._seconds_per_run = pace
-        except BaseException:
-            self.close()  # nobody waits for what the others are doing
-            raise
+        with self._lock:
+            try:
+                for block, (part, seconds) in self._results(world, work):
+                    some, which = places[block]
+                    for own, values in zip(tally, part, strict=True):
+                        own[which, some] = values
+                    pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
+                self._seconds_per_run = pace
+            except BaseException:
+                self.close()  # nobody waits for what the others are doing
+                raise
 
     def _results(self, world: bytes, work: Sequence[bytes]) -> Iterator[tuple[int, tuple[Tally, float]]]:
         """Have all of `work` done; yields what comes back, with the number of the block that it belongs to."""

@@ -15,15 +15,14 @@ from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
-from exneat_cli.tasks import refuse_code
+from exneat_cli.tasks.contract import check_worlds
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
-    """The settings of a finished run, from its own config.yaml, which may name no code that is not imported yet.
+    """The settings of a finished run, from its own config.yaml.
 
     Raises:
-        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged or would
-            import code.
+        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged.
     """
     where = f"run={directory.path}"
     if not directory.is_there():
@@ -33,9 +32,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         fix = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
-        plain = read_yaml(directory.config)
-        refuse_code(plain.get("task"))
-        settings = RunSettings.from_plain(plain)
+        settings = RunSettings.from_plain(read_yaml(directory.config))
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
     if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):
@@ -96,6 +93,7 @@ def run_robustness(
     with directory.held():
         settings = load_settings(directory)
         check_sweeps(settings, sweeps, episodes)
+        check_worlds(settings.task)
         acting = _acting(directory, settings)
         for sweep in sweeps:
             levels = missing_levels(directory, sweep, episodes)

@@ -32,6 +32,7 @@ from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_se
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
+from exneat_cli.tasks.contract import check_worlds
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ def train(
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
+    check_worlds(settings.task)  # before anything is written
     progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}

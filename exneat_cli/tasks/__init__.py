@@ -5,7 +5,6 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
-from exneat_cli.tasks.code import import_code, refuse_code
 from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.world import GridTask

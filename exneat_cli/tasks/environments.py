@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import importlib
 import json
 import math
 import warnings
@@ -17,7 +18,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from exneat_cli.errors import ConfigError, shortened
-from exneat_cli.tasks.code import import_code
+from exneat_cli.tasks.user_code import make_findable
 
 
 class Interface(NamedTuple):
@@ -80,13 +81,15 @@ def _unsupported(env_id: str, expected: str, came: object) -> ConfigError:
 
 def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymnasium.Env[Any, Any]:
     """Make an environment, or say in words why that cannot be."""
-    import_code({"env_id": env_id})
+    module, _, own_id = env_id.rpartition(":")
+    if module:
+        _import(module, env_id)
     # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # advice about versions and spaces
-            env = gymnasium.make(env_id, max_episode_steps=max_steps, disable_env_checker=True, **kwargs)
+            env = gymnasium.make(own_id, max_episode_steps=max_steps, disable_env_checker=True, **kwargs)
     except (gymnasium.error.DependencyNotInstalled, ImportError) as error:
         raise ConfigError("task.env_id", "an environment that is installed", env_id, in_words(error)) from error
     except gymnasium.error.Error as error:
@@ -96,9 +99,19 @@ def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymna
             expected = f"arguments that {env_id} takes"
             raise ConfigError("task.kwargs", expected, dict(kwargs), in_words(error)) from error
         raise ConfigError("task.env_id", "an environment that can be made", env_id, in_words(error)) from error
-    if env.spec is None or env.spec.id != env_id.rpartition(":")[2]:
+    if env.spec is None or env.spec.id != own_id:
         raise _unknown(env_id)  # Gymnasium takes the newest version where none is named
     return env
+
+
+def _import(module: str, env_id: str) -> None:
+    """Import what registers an environment; whoever may not have that done is refused before, see `find_task`."""
+    make_findable(module.partition(".")[0])
+    try:
+        importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # whatever its code does
+        expected = "a module that can be imported from here, a colon and an id"
+        raise ConfigError("task.env_id", expected, env_id, in_words(error)) from error
 
 
 def _unknown(env_id: str) -> ConfigError:
@@ -109,6 +122,6 @@ def _unknown(env_id: str) -> ConfigError:
     return ConfigError("task.env_id", "the id of a registered environment, with its version", env_id, fix)
 
 
-def in_words(error: Exception) -> str:
+def in_words(error: BaseException) -> str:
     """An error of any code in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]

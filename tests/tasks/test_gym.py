@@ -180,7 +180,7 @@ def test_the_order_of_parts_makes_another_run_and_that_of_arguments_does_not() -
         ({"env_id": "x/y/z"}, "task.env_id: expected the id of a registered environment"),
         ({"env_id": ""}, "task.env_id: expected the id"),
         ({"env_id": 3}, "task.env_id: expected the id"),
-        ({"env_id": "no_such_module:Env-v0"}, "task.env_id: expected code that can be imported"),
+        ({"env_id": "no_such_module:Env-v0"}, "task.env_id: expected a module that can be imported"),
         ({"env_id": "Blackjack-v1"}, r"task.env_id: expected .* Box of numbers, .*\n  Blackjack-v1 has Tuple"),
         ({"env_id": "FrozenLake-v1"}, r"task.env_id: expected .* Box of numbers"),
         ({"env_id": ENDLESS}, r"task.max_steps: expected .*, got None\n  .* has no limit"),
