@@ -99,7 +99,7 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
         ExneatError: a key is unknown, named with the nearest valid one, or missing.
     """
     section = check_section(prefix.rstrip("."), values)
-    # A field's setting may have another name, see `exneat_cli.tasks.task.setting`.
+    # A field's setting may have another name, see `exneat_cli.tasks.setting`.
     fields = {each.metadata.get("setting", each.name): each for each in dataclasses.fields(kind)}  # type: ignore[arg-type]
     check_keys(prefix, section, fields)
     for name, field in fields.items():

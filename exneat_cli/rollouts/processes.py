@@ -47,7 +47,8 @@ class Processes:
         """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
 
         Raises:
-            ExneatError: workers cannot be started, or one after the other died over the same brains.
+            ExneatError: workers cannot be started or cannot import the task, or one after the other died over the same
+                brains.
         """
         (brains, *added), moments = acting, bool(tally[-1].size)
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
@@ -64,8 +65,11 @@ class Processes:
                         own[which, some] = values
                     pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
                 self._seconds_per_run = pace
-            except BaseException:
+            except BaseException as error:
                 self.close()  # nobody waits for what the others are doing
+                if isinstance(error, ImportError):
+                    why = f"a worker cannot import what it needs: {error}\n  executor=serial needs no worker"
+                    raise ExneatError(f"executor=processes: {why}") from error
                 raise
 
     def _results(self, world: bytes, work: Sequence[bytes]) -> Iterator[tuple[int, tuple[Tally, float]]]:

@@ -20,6 +20,7 @@ from exneat_cli.tasks.task import (
     Part,
     Simulation,
     Task,
+    setting,
 )
 
 TASKS: dict[str, type[Task]] = {

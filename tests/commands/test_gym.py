@@ -138,7 +138,7 @@ def test_a_run_directory_never_has_code_imported(loud: Path, capfd: pytest.Captu
 @pytest.mark.parametrize(
     "allowed",
     [
-        ["evaluate", "run={}", "sweep=sensor_noise", "sweep.levels=[0]", "sweep.episodes=1", "executor=serial", NAMED_BY],
+        ["evaluate", "run={}", "sweep=sensor_noise", "sweep.levels=[0]", "executor=serial", NAMED_BY],
         ["train", "--config-path", "{}", "output=elsewhere", "executor.name=serial", NAMED_BY],
         ["train", *SMALL, NAMED_BY, "executor=serial", "output=out", "resume=true", "generations=3"],
     ],
