@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from exneat_cli.errors import ConfigError, shortened
+from exneat_cli.errors import ConfigError
 from exneat_cli.tasks.user_code import make_findable
 
 
@@ -75,7 +75,7 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
 
 
 def _unsupported(env_id: str, expected: str, came: object) -> ConfigError:
-    fix = f"{env_id} has {shortened(str(came))}; a wrapper of gymnasium.wrappers may turn it into one"
+    fix = f"{env_id} has {str(came)[:200]}; a wrapper of gymnasium.wrappers may turn it into one"
     return ConfigError("task.env_id", f"an environment with {expected}", env_id, fix)
 
 

@@ -116,12 +116,12 @@ def test_an_address_is_none_of_theirs() -> None:
 
 
 def started(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
-    """A long run, once it is under way, and its processes but for the first."""
+    """A long run, once it is under way and all that it needs is compiled, and its processes but for the first."""
     settings = ["task=gym", "generations=100000", "executor.workers=2", "task.max_steps=50", f"output={folder}"]
     command = [Path(sys.executable).parent / "exneat", "train", *settings]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 120
-    while not list(folder.glob("*/*/history.csv")):
+    while not any(len(path.read_text().splitlines()) > 3 for path in folder.glob("*/*/history.csv")):
         assert time.monotonic() < deadline
         assert process.poll() is None, process.stderr.read()  # type: ignore[union-attr]
         time.sleep(0.1)
