@@ -55,7 +55,8 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     """Make the environment once to see its spaces; `kwargs` is JSON."""
     env = make(env_id, json.loads(kwargs), None)
     try:
-        senses, acts, max_steps = env.observation_space, env.action_space, env.spec and env.spec.max_episode_steps
+        senses, acts = env.observation_space, env.action_space
+        max_steps = env.spec.max_episode_steps if env.spec else None
     finally:
         env.close()
     if not isinstance(senses, spaces.Box) or senses.dtype.kind not in "biuf" or not senses.shape:
