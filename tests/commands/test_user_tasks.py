@@ -29,7 +29,7 @@ runs: {smoke: 2}
 
 @pytest.fixture(autouse=True)
 def _walks(workplace: Path) -> None:
-    Path("walks.py").write_text(MARK + CORRIDOR, encoding="utf-8")
+    Path("walks.py").write_text(CORRIDOR + MARK, encoding="utf-8")
 
 
 def runs_in(output: str) -> list[RunDirectory]:

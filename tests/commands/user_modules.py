@@ -68,7 +68,7 @@ if __name__ == "__main__":
     raise SystemExit(main())
 """
 """A program that registers a task of compiled functions."""
-MARK = 'from pathlib import Path\nPath("imported").touch()\nprint("imported")\n'
+MARK = '\nfrom pathlib import Path\nPath("imported").touch()\nprint("imported")\n'
 
 
 def forget_user_code() -> None:
