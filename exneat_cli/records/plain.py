@@ -104,8 +104,11 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
     for name, field in fields.items():
         if name not in section and field.default is field.default_factory is dataclasses.MISSING:
             raise ExneatError(f"{prefix}{name}: is missing")
-    hints = get_type_hints(kind)
-    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in section.items()})
+    try:
+        hints = get_type_hints(kind)
+    except NameError:  # of a user's class, for type checkers alone, or of a program that is not this worker's
+        hints = {}
+    return kind(**{key: _made(hints.get(key), value, f"{prefix}{key}") for key, value in section.items()})
 
 
 def _made(hint: Any, value: Any, key: str) -> Any:
