@@ -245,6 +245,8 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
         known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
+        if group == "task":
+            return f"{known}\n  a class of your own goes by task=custom task.kind=package.module:Class"
         return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: cannot be read as YAML: {error.problem}"

@@ -105,9 +105,12 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
     for name, field in fields.items():
         if name not in section and field.default is field.default_factory is dataclasses.MISSING:
             raise ExneatError(f"{prefix}{name}: is missing")
-    hints = get_type_hints(kind)
+    try:
+        hints = get_type_hints(kind)
+    except NameError:  # of a user's class, for type checkers alone, or of a program that is not this worker's
+        hints = {}
     names = {key: fields[key].name for key in section}
-    return kind(**{name: _made(hints[name], section[key], f"{prefix}{key}") for key, name in names.items()})
+    return kind(**{name: _made(hints.get(name), section[key], f"{prefix}{key}") for key, name in names.items()})
 
 
 def _made(hint: Any, value: Any, key: str) -> Any:

@@ -250,7 +250,9 @@ class _Trial:
         signature = {"reset": "world, rng", "rewind": "world", "drive": "world, action", "locate": "world, row"}
         signature |= {"observe": "world, readings", "sense": "world, readings, sensed", "step": "world, action, terms"}
         function: Callable[..., Any] = getattr(self.simulation, name)
-        with _explained(f"{self.kind}: {name}", f"a function that runs as {name}({signature[name]})"), uninterrupted():
+        # Compiled code that reads a generator must not be interrupted; what hangs must.
+        guarded = uninterrupted() if name == "reset" else contextlib.nullcontext()
+        with _explained(f"{self.kind}: {name}", f"a function that runs as {name}({signature[name]})"), guarded:
             return function(self.simulation.world, *arguments)
 
 

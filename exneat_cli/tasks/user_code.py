@@ -124,7 +124,7 @@ def _check_class(found: Any, reference: str) -> None:
         raise ConfigError(
             "task.kind", "a class that defines all of a task", reference, f"it lacks {', '.join(missing)}"
         )
-    if not (dataclasses.is_dataclass(found) and found.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+    if not (dataclasses.is_dataclass(found) and found.__dataclass_params__.frozen):
         raise ConfigError("task.kind", "a frozen dataclass", reference, "write @dataclass(frozen=True) above the class")
     fields = {field.name for field in dataclasses.fields(found)}
     if "name" not in fields or "kind" in fields:

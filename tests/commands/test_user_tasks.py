@@ -13,7 +13,7 @@ import pytest
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, read_yaml
 from tests.commands.refusals import check_refusal
-from tests.commands.user_modules import COMPILED, CORRIDOR, EXAMPLE, MARK, forget_user_code
+from tests.commands.user_modules import CORRIDOR, EXAMPLE, MARK, forget_user_code
 
 CUSTOM = ["task=custom", "task.kind=walks:Corridor"]
 SMALL = ["budget=smoke", "executor=serial"]
@@ -29,7 +29,7 @@ runs: {smoke: 2}
 
 @pytest.fixture(autouse=True)
 def _walks(workplace: Path) -> None:
-    Path("walks.py").write_text(MARK + CORRIDOR, encoding="utf-8")
+    Path("walks.py").write_text(CORRIDOR + MARK, encoding="utf-8")
 
 
 def runs_in(output: str) -> list[RunDirectory]:
@@ -233,16 +233,17 @@ SUBMITIT = ["hydra/launcher=submitit_local", "hydra.sweep.dir=jobs", "executor=s
 DASK = ["executor=dask", "executor.workers=1"]
 
 
-@pytest.mark.parametrize("workers", [JOBLIB, SUBMITIT, DASK], ids=["joblib", "submitit", "dask"])
-@pytest.mark.parametrize("way", ["kind", "program", "compiled"])
-def test_workers_know_what_a_user_named_or_a_program_registered(way: str, workers: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("is_program", "workers"),
+    [(True, JOBLIB), (False, SUBMITIT), (False, DASK)],
+    ids=["program-joblib", "kind-submitit", "kind-dask"],
+)
+def test_workers_know_what_a_user_named_or_a_program_registered(is_program: bool, workers: list[str]) -> None:
     for library in ("hydra_plugins.hydra_joblib_launcher", "hydra_plugins.hydra_submitit_launcher", "distributed"):
         pytest.importorskip(library)
-    Path("program").mkdir()
-    Path("program/walk.py").write_text(COMPILED if way == "compiled" else EXAMPLE.read_text(encoding="utf-8"))
-    exneat = [str(Path(sys.executable).parent / "exneat"), "train", *CUSTOM]
-    program = [sys.executable, "program/walk.py", "train", "task=custom", "task.name=corridor"]
-    asked = [*(exneat if way == "kind" else program), "-m", "budget=smoke", "seed=0,1", *SWEEP, *workers]
+    named = [str(Path(sys.executable).parent / "exneat"), "train", *CUSTOM]
+    program = [sys.executable, str(EXAMPLE), "train", "task=custom", "task.name=corridor"]
+    asked = [*(program if is_program else named), "-m", "budget=smoke", "seed=0,1", *SWEEP, *workers]
     done = subprocess.run(asked, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert [len(run.robustness.read_text().splitlines()) for run in runs_in("outputs")] == [3, 3]
