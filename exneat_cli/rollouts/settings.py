@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real, check_whole, is_finite
 from exneat_cli.tasks import HasInitialPose, Task
 
-EXECUTORS = ("threads", "serial", "dask")
+EXECUTORS = ("threads", "serial", "processes", "dask")
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
 
 
@@ -20,7 +20,8 @@ class Executor:
     """Where episodes run; results do not depend on it.
 
     Attributes:
-        name: ``threads``, ``serial`` for one thread, or ``dask`` for the worker processes of a cluster.
+        name: ``threads``, ``serial`` for one thread, ``processes`` for worker processes on this machine, or ``dask``
+            for those of a cluster.
         workers: number of threads, or of processes with one thread each; 0 takes every core this process may
             use. A cluster at an address has workers of its own: 0 there.
         address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
@@ -63,6 +64,11 @@ class Executor:
         """
         if self.name == "dask" and find_spec("distributed") is None:
             raise ExneatError("executor=dask: expected dask, which is not installed\n  pip install 'exneat[dask]'")
+
+
+def is_compiled(task: Task) -> bool:
+    """Whether episodes of a task run in compiled code, which threads speed up; plain Python needs processes."""
+    return task.open(training=False).compiled
 
 
 @dataclass(frozen=True)

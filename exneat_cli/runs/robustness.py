@@ -11,11 +11,12 @@ from collections.abc import Mapping, Sequence
 from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_section, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
-from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.tasks import TASKS
+from exneat_cli.tasks.contract import check_worlds
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
@@ -75,7 +76,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
                 raise ConfigError(key, expected, came, fix) from error
 
 
-@keep_clusters()
+@keep_workers()
 def run_robustness(
     directory: RunDirectory,
     sweeps: Sequence[Sweep],
@@ -97,6 +98,7 @@ def run_robustness(
     with directory.held():
         settings = load_settings(directory)
         check_sweeps(settings, sweeps, episodes)
+        check_worlds(settings.task)
         acting = _acting(directory, settings)
         for sweep in sweeps:
             levels = missing_levels(directory, sweep, episodes)

@@ -27,12 +27,13 @@ from exneat_cli.records import (
     write_checkpoint,
     write_history,
 )
-from exneat_cli.rollouts import Runner, keep_clusters
+from exneat_cli.rollouts import Runner, keep_workers
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
+from exneat_cli.tasks.contract import check_worlds
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Finished:
     trained_now: bool
 
 
-@keep_clusters()
+@keep_workers()
 def train(
     settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
@@ -57,6 +58,7 @@ def train(
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
+    check_worlds(settings.task)  # before anything is written
     progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}

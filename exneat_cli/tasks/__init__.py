@@ -8,6 +8,7 @@ import gymnasium
 from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.world import GridTask
+from exneat_cli.tasks.gym import GymTask
 from exneat_cli.tasks.robots.robot import AntTask, RobotTask
 from exneat_cli.tasks.task import (
     ENDED,
@@ -19,6 +20,7 @@ from exneat_cli.tasks.task import (
     Part,
     Simulation,
     Task,
+    setting,
 )
 
 TASKS: dict[str, type[Task]] = {
@@ -28,6 +30,7 @@ TASKS: dict[str, type[Task]] = {
     "general_maze": GeneralMaze,
     "foraging": Foraging,
     "hunting": Hunting,
+    "gym": GymTask,
 }
 """Every task by the name it has in `conf/task`."""
 

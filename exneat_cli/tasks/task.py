@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -17,6 +17,11 @@ ENDED = 1
 """The episode is over in an ordinary way: solved, fallen, stuck or out of time."""
 FAILED = 2
 """The simulation exploded or a value was not finite; nothing that it gave counts."""
+
+
+def setting(name: str, default: Any) -> Any:
+    """A dataclass field whose setting is called `name`, where the field itself cannot be: ``parts`` is a property."""
+    return field(default=default, metadata={"setting": name})
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,8 @@ class Task(ABC):
 
     def identity(self) -> dict[str, Any]:
         """The parameters that make two tasks the same, as plain data for a run's hash."""
-        return asdict(self)  # type: ignore[call-overload, no-any-return]
+        plain = self.to_plain()  # the order of parts counts, since geometry vectors go by it
+        return {key: list(value.items()) if isinstance(value, dict) else value for key, value in plain.items()}
 
     def files(self) -> dict[str, bytes]:
         """Contents of the files that the task is made of, which a run keeps, by their relative paths."""
@@ -179,6 +185,11 @@ class Task(ABC):
     def resting_action(self) -> NDArray[np.float64]:
         """The action that does nothing, (actuators,)."""
         return np.zeros(len(self.actuator_names))
+
+    def to_plain(self) -> dict[str, Any]:
+        """The parameters as plain data, by the names of their settings, see `setting`."""
+        values = asdict(self)  # type: ignore[call-overload]
+        return {each.metadata.get("setting", each.name): values[each.name] for each in fields(self)}  # type: ignore[arg-type]
 
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""

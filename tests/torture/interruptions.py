@@ -113,7 +113,8 @@ def _commands(experiment: Path) -> list[_Command]:
     ]
     if find_spec("hydra_plugins.hydra_joblib_launcher"):
         commands.append(_Command("runs side by side", [*several, *_JOBLIB, "executor=serial"], ["resume=true"]))
-    return commands
+    processes = ["train", "task=gym", "budget=smoke", "population=40", "generations=16", "executor.workers=2"]
+    return [*commands, _Command("in processes", processes, ["resume=true"])]
 
 
 def _try(

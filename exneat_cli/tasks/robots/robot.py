@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -25,7 +25,7 @@ from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
 from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, read_off
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
-from exneat_cli.tasks.task import Part, Simulation, Task
+from exneat_cli.tasks.task import Part, Simulation, Task, setting
 
 REWARDS = ("thesis", "gymnasium")
 THESIS_CONTROL_WEIGHT = 0.01
@@ -65,7 +65,7 @@ class RobotTask(Task):
     frame: str = "part"
     symmetry: str | None = None
     contact_forces: bool = False
-    part_bodies: Mapping[str, Sequence[str]] | None = None
+    part_bodies: Mapping[str, Sequence[str]] | None = setting("parts", None)
     control_period: float | None = None
     reward: str = "gymnasium"
     max_steps: int = 1000
@@ -158,7 +158,7 @@ class RobotTask(Task):
 
     def identity(self) -> dict[str, Any]:
         """The parameters, with the model by its content."""
-        return {**asdict(self), "model": digest_of(self.model)}
+        return {**super().identity(), "model": digest_of(self.model)}
 
     def files(self) -> dict[str, bytes]:
         """The model's files, unless it has a name."""
