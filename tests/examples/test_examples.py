@@ -137,6 +137,7 @@ def test_the_task_goes_by_its_class_and_as_the_package_that_its_pyproject_makes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "custom_task", raising=False)
     shutil.copy(EXAMPLES / "custom_task.py", tmp_path)
     assert main(["train", "task=custom", "task.kind=custom_task:Corridor", "budget=smoke"]) == 0
     project = tomllib.loads((EXAMPLES / "pyproject.toml").read_text(encoding="utf-8"))["project"]
