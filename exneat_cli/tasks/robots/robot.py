@@ -317,9 +317,6 @@ class AntTask(RobotTask):
 
     def identity(self) -> dict[str, Any]:
         """The parameters; those that came later count only where they change Ant as it always was."""
-        plain, before = super().identity(), AntTask()
-        later = ("model", "frame", "symmetry", "contact_forces", "part_bodies", "control_period")
-        kept = {
-            key: value for key, value in plain.items() if key not in later or getattr(self, key) != getattr(before, key)
-        }
-        return kept if self.frame == "part" else {key: value for key, value in kept.items() if key != "symmetry"}
+        later = ("model", "frame", "symmetry", "contact_forces", "parts", "control_period")
+        now, before = self.to_plain(), AntTask().to_plain()
+        return {key: value for key, value in super().identity().items() if key not in later or now[key] != before[key]}
