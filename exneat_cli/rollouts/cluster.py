@@ -158,5 +158,6 @@ async def _ignore_interrupts() -> None:
 
 async def _stop_workers(cluster: Any) -> None:
     """End the workers; those in the midst of episodes after a second, since they have nothing to save."""
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it would tell of futures that nobody waits for any more
     stopping = [nanny.close(timeout=1.0) for nanny in cluster.workers.values()]
     await asyncio.gather(*stopping, return_exceptions=True)
