@@ -93,7 +93,7 @@ class Job:
 
 def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
     """Let what the settings of a task would import be imported, as far as the user named it himself."""
-    code = code_in(check_section("task", plain.get("task")))
+    code = code_in(check_section("task", plain.get("task", {})))
     NAMED.update(reference for key, reference in code.items() if line.names(key))
 
 
