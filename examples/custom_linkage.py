@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 from exneat_cli.main import main
 from exneat_cli.tasks import Part
-from exneat_cli.wiring import LINKAGES, Pin, counter_clockwise
+from exneat_cli.wiring import LINKAGES, Pin, peers_of
 
 
 def ring(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The outputs of the next part module, counter-clockwise, as they were at the previous step."""
-    neighbours = counter_clockwise(parts, own)[:1]
+    neighbours = peers_of(parts, own)[:1]
     return tuple(Pin(k, peer, delayed=True) for peer in neighbours for k in range(outputs[peer]))
 
 

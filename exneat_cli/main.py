@@ -40,6 +40,7 @@ usage: exneat <command> [key=value ...]
   exneat train --help                           every setting with its default; the same for the other commands
   exneat train --cfg job task=hunting           what these settings come to, without training
   exneat train --config-dir mine task=own       mine/task/own.yaml is a task of your own
+  exneat train task=custom task.kind=my_module:MyTask   and so is this class
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
   exneat report                                 outputs/report/index.html

@@ -44,6 +44,7 @@ class CommandLine:
     directories: tuple[Path, ...]  # where YAML files are looked for, in this order
     settings: tuple[str, ...]  # key=value, as Hydra's composition takes them
     launcher: tuple[str, ...]  # the same for Hydra's launcher
+    config_path: Path | None  # a directory that comes before all others, such as a run's
     multirun: bool  # whether settings with several values are to be gone through
     shown: str  # help or job if that is all that is asked for, else empty
 
@@ -80,6 +81,13 @@ class CommandLine:
             except Exception as error:  # Hydra and YAML raise errors of many kinds
                 raise ExneatError(in_words(error, self.directories)) from error
             yield config
+
+    def names(self, key: str) -> bool:
+        """Whether the value of a key is the user's own word: that of a setting, or of a file that he chose.
+
+        What ``--config-path`` holds is not: it may be the directory of anybody's run.
+        """
+        return self.config_path is None or any(text.lstrip("+").partition("=")[0] == key for text in self.settings)
 
     def combinations(self) -> dict[str, CommandLine]:
         """Each combination of the settings that have several values, by those values."""
@@ -151,6 +159,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         directories=directories,
         settings=tuple(text for text in read if not _is_hydras(text)),
         launcher=tuple(text for text in read if _is_hydras(text)),
+        config_path=flags.config_path,
         multirun=flags.multirun,
         shown="help" if flags.help else flags.cfg or "",
     )
@@ -236,6 +245,8 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
         known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
+        if group == "task":
+            return f"{known}\n  a class of your own goes by task=custom task.kind=package.module:Class"
         return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: cannot be read as YAML: {error.problem}"

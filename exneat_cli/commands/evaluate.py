@@ -6,10 +6,10 @@ import glob
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import with_sweeps
-from exneat_cli.errors import ConfigError, ExneatError, check_keys
+from exneat_cli.commands.jobs import name_code, with_sweeps
+from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
 from exneat_cli.records import RunDirectory, build
-from exneat_cli.rollouts import Executor
+from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
 
 
@@ -20,10 +20,13 @@ def run(line: CommandLine) -> int:
         ExneatError: a run, a sweep or a level is unusable; nothing was run then.
     """
     plain = line.compose()
-    check_keys("", plain, ("run", "sweep", "sweeps", "executor"))
+    check_keys("", plain, ("run", "task", "sweep", "sweeps", "executor"))
+    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
+    name_code(line, plain)
     if not plain["sweeps"]:
         raise ConfigError("sweep", "what to perturb, e.g. sweep=sensor_noise", "none")
-    executor = build(Executor, plain["executor"], "executor.")
+    where = check_section("executor", plain.get("executor", {}))
+    build(Executor, where, "executor.")
     planned = []
     for directory in _directories(plain["run"]):
         try:
@@ -31,6 +34,8 @@ def run(line: CommandLine) -> int:
         except ConfigError as error:
             raise ExneatError(f"{directory.path}: {error}") from error
     for directory, job in planned:
+        fitting = "threads" if is_compiled(job.settings.task) else "processes"
+        executor = build(Executor, {"name": fitting, **where}, "executor.")
         tested = job.test(directory, executor, progress_for_terminal())
         came = f"{directory.robustness}: {tested} levels tested now"
         print(came if tested else f"{directory.path}: all there already")

@@ -1,7 +1,8 @@
-"""`exneat inspect`: a run's wiring in words, or the list of runs."""
+"""`exneat inspect`: a run's wiring in words, a task's parts before any run, or the list of runs."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -11,24 +12,52 @@ from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_keys, check_text
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
-from exneat_cli.wiring import Module
+from exneat_cli.runs import read_task
+from exneat_cli.tasks import Task
+from exneat_cli.wiring import GEOMETRIES, Geometry, Module
 
 
 def run(line: CommandLine) -> int:
-    """Print the wiring of ``run=<directory>``, or the runs below ``output=<directory>``.
+    """Print the wiring of ``run=<directory>``, the parts of ``task=<name>``, or the runs below ``output=<directory>``.
 
     Raises:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
     plain = line.compose()
-    check_keys("", plain, ("run", "output"))
-    if plain["run"] is not None:
+    check_keys("", plain, ("run", "output", "task", "evolution", "budgets"))
+    if "task" in plain:
+        _show_task(read_task(plain["task"]))
+    elif plain["run"] is not None:
         check_text("run", plain["run"], "a run directory")
         _show(RunDirectory(Path(plain["run"])))
     else:
         check_text("output", plain["output"], "a directory")
         _list(Path(plain["output"]))
     return 0
+
+
+def _show_task(task: Task) -> None:
+    print(f"task {task.name}: {task.sensed_size} sensors, {len(task.actuator_names)} actuators\n")
+    for part in (*task.parts, *filter(None, [task.trunk])):
+        x, y = part.position
+        print(f"{part.name}  at ({x:+.2f}, {y:+.2f}, {part.height:+.2f})")
+        drives = ", ".join(task.actuator_names[actuator] for actuator in part.actuators)
+        remarks = {**task.remarks_on(part), "drives": drives or "nothing itself"}
+        remarks["senses"] = ", ".join(task.sensor_names[entry] for entry in part.sensors)
+        if part.trunk:
+            remarks["trunk"] = f"{len(part.trunk)} entries as seen from here, for wiring.trunk=shared"
+        for word, text in remarks.items():
+            print(textwrap.fill(text, 110, initial_indent=f"  {word:<8} ", subsequent_indent=" " * 11))
+        print()
+    print("geometry  which parts share a network: " + " ".join(part.name for part in task.parts))
+    for name in GEOMETRIES[:-1]:
+        try:
+            vector = " ".join(map(str, Geometry(name).subpopulations(task.parts)))
+        except ExneatError:
+            vector = "does not fit"
+        print(f"{name:<8}  {vector}")
+    if len(task.parts) == 1:
+        print("One part: its module is all there is, so modules make no difference, and ExNEAT trains what NEAT does.")
 
 
 def _show(run: RunDirectory) -> None:

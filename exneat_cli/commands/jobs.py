@@ -6,14 +6,16 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_keys, check_section
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_finished, run_robustness, train
+from exneat_cli.tasks.user_code import NAMED, code_in
 
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
-_SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings))
+_SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings) if f.name != "task_kind")
 _SPENT = ("generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes")
 _OF_SWEEPS = ("parameter", "label", "levels")
 
@@ -89,12 +91,20 @@ class Job:
                 draw[name]()
 
 
-def read_job(name: str, plain: Mapping[str, Any], others: Sequence[str] = ()) -> Job:
-    """Check a composed configuration, in which `others` are no settings of the run, and make a job of it.
+def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
+    """Let what the settings of a task would import be imported, as far as the user named it himself."""
+    code = code_in(check_section("task", plain.get("task", {})))
+    NAMED.update(reference for key, reference in code.items() if line.names(key))
+
+
+def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
+    """Compose the settings of a run, beside which `others` may be set, check them, and make a job of them.
 
     Raises:
         ExneatError: a key is unknown or missing, a value is of the wrong type or out of range, or a sweep does not fit.
     """
+    plain = line.compose()
+    name_code(line, plain)
     check_keys("", plain, (*_SETTINGS, "budget", "budgets", "sweep", "sweeps", *others))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)

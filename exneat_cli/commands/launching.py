@@ -8,7 +8,7 @@ import os
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,18 @@ from hydra.core.plugins import Plugins
 from hydra.types import HydraContext
 from omegaconf import OmegaConf
 
+from exneat_cli.algorithms import ALGORITHMS
 from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import as_worker, launching, signal_heard
-from exneat_cli.rollouts import keep_clusters
+from exneat_cli.rollouts import keep_workers
+from exneat_cli.tasks import TASKS
+from exneat_cli.tasks.user_code import NAMED
+from exneat_cli.wiring import LINKAGES
 
+_REGISTRIES: tuple[Any, ...] = (TASKS, ALGORITHMS, LINKAGES, NAMED)
+"""What a program or its user may have added to, and a worker, which runs another program, must know too."""
 _WRITING_NOTHING = (
     *("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null"),
     *("hydra.sweep.dir=.", "hydra.sweep.subdir=."),
@@ -44,11 +50,13 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
         ExneatError: there is no such launcher, or it gave up; some jobs may be done by then.
     """
     if not line.launcher:
-        with keep_clusters():  # starting one takes seconds
+        with keep_workers():  # starting one takes seconds
             return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
     with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
-        here = functools.partial(_do_here, Path.cwd(), functools.partial(_do, work, jobs, Path(workplace)))
-        return _launch(here, len(jobs), line, Path(workplace))
+        known = [registry.copy() for registry in _REGISTRIES]
+        here = functools.partial(_do_here, Path.cwd(), known, functools.partial(_do, work, jobs, Path(workplace)))
+        with _importable():
+            return _launch(here, len(jobs), line, Path(workplace))
 
 
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
@@ -70,9 +78,26 @@ def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: 
             raise ExneatError(in_words(error, line.directories)) from error
 
 
-def _do_here(directory: Path, task: Callable[[Mapping[str, int]], str], config: Mapping[str, int]) -> str:
+@contextlib.contextmanager
+def _importable() -> Iterator[None]:
+    """Let processes that are started meanwhile import what this one can, from its program's directory too."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+    try:
+        yield
+    finally:
+        os.environ.pop("PYTHONPATH")
+        if before is not None:
+            os.environ["PYTHONPATH"] = before
+
+
+def _do_here(
+    directory: Path, known: Sequence[Any], task: Callable[[Mapping[str, int]], str], config: Mapping[str, int]
+) -> str:
     """Do one job in a worker; joblib keeps workers, which may have begun in another directory than this launch."""
     os.chdir(directory)
+    for registry, entries in zip(_REGISTRIES, known, strict=True):
+        registry.update(entries)
     return task(config)
 
 

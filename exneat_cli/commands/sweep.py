@@ -32,6 +32,7 @@ from exneat_cli.errors import (
 from exneat_cli.interruption import signal_heard
 from exneat_cli.records import DONE, build
 from exneat_cli.runs import Progress, progress_for_terminal
+from exneat_cli.tasks.contract import check_worlds
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
 _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "hydra"}
@@ -176,8 +177,7 @@ def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Se
         }
         try:
             texts = [read_setting(f"{key}={as_written(value)}", line.directories) for key, value in settings.items()]
-            composed = replace(line, settings=(*texts, *line.settings, f"budget={budget}")).compose()
-            first = read_job("", composed, others)
+            first = read_job("", replace(line, settings=(*texts, *line.settings, f"budget={budget}")), others)
             for k in range(variant.runs or experiment.runs[budget]):
                 seeded = replace(first.settings, seed=first.settings.seed + k)
                 jobs.append(replace(first, name=f"{place}/{name}/{seeded.seed}", settings=seeded))
@@ -203,6 +203,8 @@ def run(line: CommandLine) -> int:
     experiment = read_experiment(asked["experiment"])
     jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
     pending = [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
+    for job in pending:
+        check_worlds(job.settings.task)
     before = len(jobs) - len(pending)
     counted = f"{len(jobs)} runs, {before} of them finished before"
     print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)

@@ -11,6 +11,7 @@ from exneat_cli.commands.jobs import Job, read_job
 from exneat_cli.commands.launching import run_jobs
 from exneat_cli.errors import ExneatError
 from exneat_cli.runs import Finished, progress_for_terminal
+from exneat_cli.tasks.contract import check_worlds
 
 
 def run(line: CommandLine) -> int:
@@ -20,13 +21,15 @@ def run(line: CommandLine) -> int:
         ExneatError: the configuration or a run directory is unusable, in at least one job of a multirun.
     """
     if not line.multirun and not line.launcher:
-        job = read_job("train", line.compose())
+        job = read_job("train", line)
         _tell(job.do(progress_for_terminal(), line.words, go_on=False))
         return 0
     jobs, failures = [], []
     for name, each in line.combinations().items():
         try:
-            jobs.append(read_job(name or "train", each.compose()))
+            job = read_job(name or "train", each)
+            check_worlds(job.settings.task)
+            jobs.append(job)
         except ExneatError as error:
             failures.append(str(error))
             print(f"exneat: {name or 'train'}: {error}", file=sys.stderr)

@@ -99,13 +99,18 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
         ExneatError: a key is unknown, named with the nearest valid one, or missing.
     """
     section = check_section(prefix.rstrip("."), values)
-    fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    # A field's setting may have another name, see `exneat_cli.tasks.setting`.
+    fields = {each.metadata.get("setting", each.name): each for each in dataclasses.fields(kind)}  # type: ignore[arg-type]
     check_keys(prefix, section, fields)
     for name, field in fields.items():
         if name not in section and field.default is field.default_factory is dataclasses.MISSING:
             raise ExneatError(f"{prefix}{name}: is missing")
-    hints = get_type_hints(kind)
-    return kind(**{key: _made(hints[key], value, f"{prefix}{key}") for key, value in section.items()})
+    try:
+        hints = get_type_hints(kind)
+    except NameError:  # of a user's class, for type checkers alone, or of a program that is not this worker's
+        hints = {}
+    names = {key: fields[key].name for key in section}
+    return kind(**{name: _made(hints.get(name), section[key], f"{prefix}{key}") for key, name in names.items()})
 
 
 def _made(hint: Any, value: Any, key: str) -> Any:

@@ -78,6 +78,7 @@ class RunDirectory:
         self.trace = self.path / "trace.csv"
         self.tiles = self.path / "tiles.csv"
         self.plots = self.path / "plots"
+        self.model = self.path / "model"
 
     @contextlib.contextmanager
     def claimed(
@@ -165,8 +166,20 @@ class RunDirectory:
         named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
         return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
 
-    def begin(self, config: str, manifest: Manifest) -> None:
-        """Write the first two files, the manifest first; if that fails, a directory that was new is gone again.
+    def is_alike(self, configuration: Mapping[str, Any]) -> bool:
+        """Whether the run has these settings, word for word."""
+        try:
+            return _identity(read_yaml(self.config)) == _identity(configuration)
+        except (ExneatError, TypeError, ValueError):
+            return False
+
+    def begin(self, config: str, manifest: Manifest, files: Mapping[str, bytes]) -> None:
+        """Write the first files, the manifest before all; if that fails, a directory that was new is gone again.
+
+        Args:
+            config: what config.yaml holds.
+            manifest: of the run.
+            files: what the task is made of, to keep below `model` by their paths.
 
         Raises:
             ExneatError: they cannot be written.
@@ -175,6 +188,9 @@ class RunDirectory:
         try:
             write_json(self.manifest, manifest)
             write_whole(self.config, config)
+            for name, content in files.items():
+                make_directory((self.model / name).parent)
+                write_whole(self.model / name, content)
         except ExneatError:
             if is_new:
                 shutil.rmtree(self.path, ignore_errors=True)

@@ -8,75 +8,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 import logging
 import math
-import pickle
-import platform
 import signal
+import sys
 import tempfile
-import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from importlib.metadata import version
 from multiprocessing import resource_tracker
 from typing import Any
 
-import numpy as np
-
-import exneat_cli
-from exneat_cli.compiling import source_digest
 from exneat_cli.errors import ExneatError
-from exneat_cli.rollouts.episode import Acting, Tally, empty_tally, open_world, run_shares
-from exneat_cli.rollouts.settings import Executor, Noise
+from exneat_cli.rollouts.blocks import WORTH_SECONDS, Setup, blocks, run_block, versions
+from exneat_cli.rollouts.episode import Acting, Tally
+from exneat_cli.rollouts.settings import Executor
 from exneat_cli.seeding import EpisodeSeeds
-from exneat_cli.tasks import Simulation, Task
 
-WORTH_SECONDS = 0.05
-"""A block takes at least this long, where there is so much to do: sending it costs 3 to 5 ms."""
 PATIENCE_SECONDS = 60.0
 """How long a cluster may be without any worker."""
 CONNECT_SECONDS = 8
 """How long to wait for the scheduler at an address."""
-BLOCKS_PER_WORKER = 8
-"""So many blocks let workers end together."""
-
-_open: dict[Executor, _Cluster] = {}
-_users = 0
-_lock = threading.RLock()
 
 
-@contextlib.contextmanager
-def keep_clusters() -> Iterator[None]:
-    """While inside, clusters that runners open stay open for the next ones; the last to leave closes them."""
-    global _users
-    with _lock:
-        _users += 1
-    try:
-        yield
-    finally:
-        with _lock, contextlib.ExitStack() as closing:
-            _users -= 1
-            while not _users and _open:
-                closing.callback(_open.popitem()[1].close)
-
-
-def cluster_of(executor: Executor) -> _Cluster:
-    """The open cluster of an executor, or a new one; within `keep_clusters`.
-
-    Raises:
-        ExneatError: dask is not installed, or nothing answers at the executor's address.
-    """
-    with _lock:
-        if executor in _open and _open[executor].client.status != "running":
-            _open.pop(executor).close()
-        if executor not in _open:
-            _open[executor] = _Cluster(executor)
-        return _open[executor]
-
-
-class _Cluster:
+class Cluster:
     """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files."""
 
     def __init__(self, executor: Executor) -> None:
@@ -104,9 +59,12 @@ class _Cluster:
             ending.callback(self.client.close)
             self.close = ending.pop_all().close
 
-    def run(
-        self, setup: tuple[Task, Noise, bool], acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally
-    ) -> None:
+    @property
+    def is_usable(self) -> bool:
+        """Whether the scheduler is still there."""
+        return bool(self.client.status == "running")
+
+    def run(self, setup: Setup, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
         """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
 
         Raises:
@@ -119,7 +77,7 @@ class _Cluster:
         (brains, *added), moments = acting, bool(tally[-1].size)
         workers = self._threads() or 1 if self._own is None else self._executor.threads
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
-        world, waiting = dumps(setup), {}
+        world, waiting = dumps((sys.path, dumps(setup))), {}
         pool = self.client.get_executor(pure=False)
         try:
             for some, which in blocks(len(brains.size), len(episodes), workers, max(1, smallest)):
@@ -203,62 +161,3 @@ async def _stop_workers(cluster: Any) -> None:
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it would tell of futures that nobody waits for any more
     stopping = [nanny.close(timeout=1.0) for nanny in cluster.workers.values()]
     await asyncio.gather(*stopping, return_exceptions=True)
-
-
-def blocks(brains: int, episodes: int, workers: int, smallest: int) -> list[tuple[slice, slice]]:
-    """Equal blocks of brains and episodes for the workers: whole rows if possible, so that a brain travels once.
-
-    Blocks hold at least `smallest` runs of a brain through an episode, if there is work for all.
-    """
-    runs = brains * episodes
-    wanted = min(runs, max(workers, min(BLOCKS_PER_WORKER * workers, runs // smallest)))
-    rows = max(1, min(brains, wanted))
-    columns = -(-wanted // rows)
-    return [(some, which) for some in _slices(brains, rows) for which in _slices(episodes, columns)]
-
-
-def _slices(count: int, parts: int) -> list[slice]:
-    return [slice(count * k // parts, count * (k + 1) // parts) for k in range(parts)]
-
-
-def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tally, float]:
-    """Run some brains through some episodes, in a worker; returns what came out, and how many seconds it took.
-
-    Pickled are in `world` task, noise, and whether this is training; in `work` `Acting`, episodes, and whether
-    statistics of what is sensed are wanted.
-
-    Raises:
-        ExneatError: a version differs from what is `expected`, that of the process that asks.
-    """
-    for name, wanted in expected.items():
-        if (came := versions()[name]) != wanted:
-            fix = "install the same on all machines and start the workers again"
-            raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {fix}")
-    (task, noise, training), (acting, episodes, moments) = pickle.loads(world), pickle.loads(work)
-    idle = _idle_worlds(world)
-    try:
-        own = idle.pop()
-    except IndexError:  # no test before: another thread may take the last one in between
-        own = open_world(task, noise, training=training)
-    brains, began = len(acting[0].size), time.perf_counter()
-    tally = empty_tally(task, brains, len(episodes), moments=moments)
-    shares = [(episode, 0, brains) for episode in range(len(episodes))]
-    run_shares(task, noise, np.zeros(1, np.bool_), own, shares, acting, episodes, tally)
-    idle.append(own)
-    return tally, time.perf_counter() - began
-
-
-@functools.lru_cache(4)  # a robustness sweep has another one at every level
-def _idle_worlds(world: bytes) -> list[Simulation]:
-    """Opened worlds of this worker that nobody uses; take from and give back to it."""
-    return []
-
-
-@functools.cache
-def versions() -> dict[str, str]:
-    """What must be the same here and in every worker, or results could differ."""
-    return {
-        "exneat": f"{exneat_cli.__version__} with sources {source_digest()[:8]}",
-        "Python": ".".join(platform.python_version_tuple()[:2]),
-        **{library: version(library) for library in ("numpy", "numba", "mujoco")},
-    }

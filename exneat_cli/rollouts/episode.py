@@ -150,7 +150,7 @@ def open_world(task: Task, noise: Noise, *, training: bool) -> Simulation:
     Raises:
         ValueError: the world has no `sense`, but its task says that brains sense something else than the readings.
     """
-    if isinstance(task, HasInitialPose):
+    if isinstance(task, HasInitialPose) and noise.reset_scale is not None:
         simulation = task.open_disturbed(training=training, reset_scale=noise.reset_scale)
     else:
         simulation = task.open(training=training)

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import Brains, motionless
 from exneat_cli.brains.brain import lay_out
-from exneat_cli.rollouts.cluster import cluster_of, keep_clusters
 from exneat_cli.rollouts.episode import Acting, Share, Tally, empty_tally, open_world, run_shares
 from exneat_cli.rollouts.settings import Executor, Noise
+from exneat_cli.rollouts.workers import keep_workers, workers_of
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import FAILED, HasFullReward, HasTiles, Simulation, Task
 from exneat_cli.wiring import Moments, merged
@@ -82,9 +82,9 @@ class Runner:
         with contextlib.ExitStack() as ending:
             ending.callback(self._pool.shutdown, cancel_futures=True)
             ending.callback(self._halt.fill, True)  # threads end before the next step of their episodes
-            if executor.name == "dask":
-                ending.enter_context(keep_clusters())
-                cluster_of(executor)
+            if executor.name in ("processes", "dask"):
+                ending.enter_context(keep_workers())
+                workers_of(executor)
             self._ending = ending.pop_all()
 
     def __enter__(self) -> Runner:
@@ -103,7 +103,7 @@ class Runner:
 
         Raises:
             ValueError: there is no brain, or one was wired for other sizes of what is sensed or of the action.
-            ExneatError: the executor's cluster has no workers left, or cannot be used.
+            ExneatError: the executor has no workers left, or its cluster cannot be used.
         """
         acting = self._acting(brains)
         count = len(acting[0].size)
@@ -113,7 +113,7 @@ class Runner:
         elif self._executor.name == "threads":
             self._run_on_threads(acting, episodes, tally)
         else:
-            cluster_of(self._executor).run((self._task, self._noise, self._training), acting, episodes, tally)
+            workers_of(self._executor).run((self._task, self._noise, self._training), acting, episodes, tally)
         return _outcomes(self._task, tally)
 
     def trace(self, brain: Brains | None, seeds: EpisodeSeeds) -> Trace:

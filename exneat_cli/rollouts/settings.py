@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real, check_whole, is_finite
 from exneat_cli.tasks import HasInitialPose, Task
 
-EXECUTORS = ("threads", "serial", "dask")
+EXECUTORS = ("threads", "serial", "processes", "dask")
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
 
 
@@ -20,7 +20,8 @@ class Executor:
     """Where episodes run; results do not depend on it.
 
     Attributes:
-        name: ``threads``, ``serial`` for one thread, or ``dask`` for the worker processes of a cluster.
+        name: ``threads``, ``serial`` for one thread, ``processes`` for worker processes on this machine, or ``dask``
+            for those of a cluster.
         workers: number of threads, or of processes with one thread each; 0 takes every core this process may
             use. A cluster at an address has workers of its own: 0 there.
         address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
@@ -65,25 +66,31 @@ class Executor:
             raise ExneatError("executor=dask: expected dask, which is not installed\n  pip install 'exneat[dask]'")
 
 
+def is_compiled(task: Task) -> bool:
+    """Whether episodes of a task run in compiled code, which threads speed up; plain Python needs processes."""
+    return task.open(training=False).compiled
+
+
 @dataclass(frozen=True)
 class Noise:
     """What disturbs the agent.
 
     Attributes:
         sensor_std: sd of the normal noise on every reading at every step, in the reading's own unit.
-        reset_scale: size of the noise on the initial pose, uniform on positions (rad, m) and normal on
-            velocities (rad/s, m/s); 0.1 is the default of Gymnasium's Ant.
+        reset_scale: size of the noise on the initial pose, on positions (rad, m) and velocities (rad/s, m/s); None
+            takes the task's own.
 
     Raises:
         ConfigError: a value is negative or not finite.
     """
 
     sensor_std: float = 0.0
-    reset_scale: float = 0.1
+    reset_scale: float | None = None
 
     def __post_init__(self) -> None:
         check_real("noise.sensor_std", self.sensor_std, 0.0)
-        check_real("noise.reset_scale", self.reset_scale, 0.0)
+        if self.reset_scale is not None:
+            check_real("noise.reset_scale", self.reset_scale, 0.0)
 
 
 @dataclass(frozen=True)

@@ -4,4 +4,4 @@ from exneat_cli.runs.progress import Progress, progress_for_terminal
 from exneat_cli.runs.robustness import check_sweeps, is_finished, load_settings, run_robustness
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
-from exneat_cli.runs.settings import RunSettings
+from exneat_cli.runs.settings import RunSettings, read_task

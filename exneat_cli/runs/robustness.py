@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brains, acting_by_rule
-from exneat_cli.errors import ConfigError, ExneatError, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_section, check_whole
 from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
-from exneat_cli.rollouts import Executor, Runner, Sweep, keep_clusters, perturbed
+from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.tasks import TASKS
+from exneat_cli.tasks.contract import check_worlds
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
@@ -31,7 +33,11 @@ def load_settings(directory: RunDirectory) -> RunSettings:
         fix = "finish it first: the command that began it, with resume=true"
         raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
     try:
-        settings = RunSettings.from_plain(read_yaml(directory.config))
+        plain = dict(read_yaml(directory.config))
+        task = TASKS.get(str(check_section("task", plain.get("task")).get("name")))
+        if task is not None:
+            plain["task"] = task.found_in(plain["task"], directory.model)
+        settings = RunSettings.from_plain(plain)
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
     if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):
@@ -70,7 +76,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
                 raise ConfigError(key, expected, came, fix) from error
 
 
-@keep_clusters()
+@keep_workers()
 def run_robustness(
     directory: RunDirectory,
     sweeps: Sequence[Sweep],
@@ -92,6 +98,7 @@ def run_robustness(
     with directory.held():
         settings = load_settings(directory)
         check_sweeps(settings, sweeps, episodes)
+        check_worlds(settings.task)
         acting = _acting(directory, settings)
         for sweep in sweeps:
             levels = missing_levels(directory, sweep, episodes)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 import yaml
 
@@ -26,12 +27,13 @@ from exneat_cli.records import (
     write_checkpoint,
     write_history,
 )
-from exneat_cli.rollouts import Runner, keep_clusters
+from exneat_cli.rollouts import Runner, keep_workers
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
+from exneat_cli.tasks.contract import check_worlds
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Finished:
     trained_now: bool
 
 
-@keep_clusters()
+@keep_workers()
 def train(
     settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
 ) -> Finished:
@@ -56,10 +58,13 @@ def train(
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
+    check_worlds(settings.task)  # before anything is written
     progress = progress or Progress()
     directory = settings.directory
     asked = {**settings.to_plain(), "generations": settings.trained_generations}
     resume = settings.resume or go_on
+    if resume and not directory.is_there():
+        _refuse_changed_files(settings, asked)
     with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=settings.resume) as was_done:
         if not was_done:
             with _recorded(directory, settings, progress, command):
@@ -77,6 +82,16 @@ def train(
                 directory.update_manifest(status=DONE, finished=_now(), result=result)
         result = directory.read_result()
     return Finished(directory, result, summary_sentence(settings.task, result), trained_now=not was_done)
+
+
+def _refuse_changed_files(settings: RunSettings, asked: Mapping[str, Any]) -> None:
+    """Refuse to begin anew what was to be resumed, because a file that the task is made of has changed since."""
+    directory = settings.directory.path
+    name = f"{settings.variant}-s{settings.seed}-"
+    for path in sorted(directory.parent.glob(f"{name}*")) if settings.task.files() else ():
+        if RunDirectory(path).is_alike(asked):
+            fix = f"use the copy in {path / 'model'}, or leave resume=true out for a new run"
+            raise ExneatError(f"{path}: began with other files of the task than there are now\n  {fix}")
 
 
 def _save(directory: RunDirectory, training: Training) -> None:
@@ -99,8 +114,12 @@ def _recorded(
         _tell_other_versions(before, progress)
         directory.forget_what_was_derived()
     try:
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest)
+        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest, settings.task.files())
         progress.start(directory.path.name, settings.generations)
+        if settings.geometry.name == "auto" and settings.algorithm.modular:
+            vector = settings.geometry.subpopulations(settings.task.parts)
+            parts = zip(settings.task.parts, vector, strict=True)
+            progress.say(f"geometry=auto shares by likeness: {', '.join(f'{part.name} {n}' for part, n in parts)}")
         yield
     except (Exception, KeyboardInterrupt) as error:
         _mark_unfinished(directory, error)

@@ -21,7 +21,7 @@ from exneat_cli.records import (
     write_hall_of_fame,
     write_json,
 )
-from exneat_cli.rollouts import Outcomes, Runner, Trace
+from exneat_cli.rollouts import Outcomes, Runner, Trace, is_compiled
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
@@ -143,7 +143,7 @@ def robustness_row(settings: RunSettings, parameter: str, level: float, score: S
 
 
 def summary_sentence(task: Task, result: Result) -> str:
-    """What a run learned, in one sentence, from the `result` entry of its manifest.
+    """What a run learned, in one sentence, from the `result` entry of its manifest; another tells of plain Python.
 
     It says "Learned" only if the champion beats both baselines clearly: on the same test episodes, the
     mean difference exceeds twice its standard error.
@@ -158,12 +158,13 @@ def summary_sentence(task: Task, result: Result) -> str:
         f"beside {standing.fitness_mean:.{digits}f} for standing still"
     )
     first = result.first_generation
+    speed = "" if is_compiled(task) else f" task={task.name} runs in plain Python, which is slower than compiled tasks."
     if first is None:
-        return f"No training: {episodes} the baseline {earned}."
+        return f"No training: {episodes} the baseline {earned}.{speed}"
     learned = _clearly_better(champion, standing) and _clearly_better(champion, first)
     return (
         f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
-        f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation."
+        f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation.{speed}"
     )
 
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
-from exneat_cli.errors import ConfigError, check_choice, check_flag, check_section, check_text, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
+from exneat_cli.tasks.contract import check_description, is_ours
+from exneat_cli.tasks.user_code import find_task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
 _Part = TypeVar("_Part")
+_NO_POSE = 0.1
+"""The `noise.reset_scale` of tasks that have no initial pose: it disturbs nothing, and is part of hashes."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -40,6 +44,8 @@ class RunSettings:
         output: root of all run directories.
         resume: go on with an unfinished run, or make a finished one longer.
         checkpoint_every: generations from one checkpoint to the next.
+        task_kind: ``package.module:Class`` of the task if that is how its user names it, else None; plain data has it
+            as ``task.kind``.
 
     Raises:
         ConfigError: a value is out of range, or the combination makes no sense.
@@ -64,10 +70,13 @@ class RunSettings:
     output: str = "outputs"
     resume: bool = False
     checkpoint_every: int = 1
+    task_kind: str | None = None
 
     def __post_init__(self) -> None:
+        if not is_ours(self.task):
+            check_description(self.task)
         if self.evolution is None:
-            object.__setattr__(self, "evolution", RECURRENT if self.task.recurrent else EvolutionSettings())
+            object.__setattr__(self, "evolution", _suiting(self.task))
         if isinstance(self.algorithm, str):
             object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
         check_whole("seed", self.seed, 0, 2**64 - 1)
@@ -83,10 +92,20 @@ class RunSettings:
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
-        if not isinstance(self.task, HasInitialPose) and self.noise.reset_scale != Noise().reset_scale:
-            fix = f"task={self.task.name} has no initial pose that noise could disturb"
-            raise ConfigError("noise.reset_scale", f"{Noise().reset_scale}, its default", self.noise.reset_scale, fix)
+        self._settle()
         _ = self.plan
+
+    def _settle(self) -> None:
+        """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
+        own = self.task.usual_reset_scale() if isinstance(self.task, HasInitialPose) else None
+        if own is None and self.noise.reset_scale not in (None, _NO_POSE):
+            fix = f"task={self.task.name} has no initial pose that noise could disturb"
+            raise ConfigError("noise.reset_scale", "null, its default", self.noise.reset_scale, fix)
+        if self.noise.reset_scale is None:
+            object.__setattr__(self, "noise", replace(self.noise, reset_scale=_NO_POSE if own is None else own))
+        if self.algorithm.modular:
+            subpopulations = self.geometry.subpopulations(self.task.parts)
+            object.__setattr__(self, "task", self.task.shared_by(subpopulations))
 
     @property
     def plan(self) -> Plan:
@@ -100,8 +119,12 @@ class RunSettings:
             return self.algorithm.name
         vector = self.geometry.subpopulations(self.task.parts) if self.geometry.vector else ()
         geometry = self.geometry.name + "".join(str(entry) for entry in vector)
-        decentral = self.task.trunk is not None and self.wiring.central is False
-        return f"{self.algorithm.name}-{geometry}-{self.linkage}" + ("-nocentral" if decentral else "")
+        words = [self.algorithm.name, geometry, self.linkage]
+        if self.wiring.trunk != "none":
+            words.append(f"trunk{self.wiring.trunk}")
+        elif self.task.trunk is not None and self.wiring.central is False:
+            words.append("nocentral")
+        return "-".join(words)
 
     @property
     def trained_generations(self) -> int:
@@ -122,6 +145,9 @@ class RunSettings:
     def _identity(self) -> dict[str, Any]:
         """What is hashed: the settings with defaults that depend on the task spelled out."""
         plain = self.to_plain()
+        plain["task"] = {**self.task.identity(), **({} if self.task_kind is None else {"kind": self.task_kind})}
+        if self.wiring.trunk == Wiring().trunk:  # came later: runs without it keep their hashes
+            del plain["wiring"]["trunk"]
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))
@@ -129,18 +155,49 @@ class RunSettings:
 
     def to_plain(self) -> dict[str, Any]:
         """The settings as dicts, lists, tuples, numbers and strings; `from_plain` reads them back."""
-        return asdict(self)
+        plain = {**asdict(self), "task": self.task.to_plain()}
+        kind = plain.pop("task_kind")
+        return plain if kind is None else {**plain, "task": {**plain["task"], "kind": kind}}
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> RunSettings:
         """Settings from plain data, such as a composed configuration or a run's config.yaml.
 
         Raises:
-            ConfigError: a key is unknown, or a value has the wrong type or range.
+            ConfigError: a key is unknown, a value has the wrong type or range, or a user's code would have to be
+                imported that this user neither registered nor named, see `exneat_cli.tasks.user_code`.
         """
-        task = _chosen(TASKS, "task", plain.get("task"))
+        kind, task = _task(plain.get("task"))
         algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
-        return build(cls, {**plain, "task": task, "algorithm": algorithm})
+        chosen: dict[str, Any] = {"task": task, "task_kind": kind, "algorithm": algorithm}
+        if "evolution" in plain:
+            chosen["evolution"] = {**asdict(_suiting(task)), **check_section("evolution", plain["evolution"])}
+        return build(cls, {**plain, **chosen})
+
+
+def _suiting(task: Task) -> EvolutionSettings:
+    return RECURRENT if task.recurrent else EvolutionSettings()
+
+
+def _task(values: object) -> tuple[str | None, Task]:
+    """How the user names the task's class, if not by the task's name, and the task."""
+    section = {key: value for key, value in check_section("task", values).items() if (key, value) != ("name", None)}
+    found, kind = find_task(section, TASKS), section.pop("kind", None)
+    try:
+        return kind, build(found, section, "task.")
+    except ExneatError:
+        raise
+    except Exception as error:  # what a user's class does with values that it does not expect
+        raise ConfigError("task", f"parameters that {found.__name__} can take", section, repr(error)[:300]) from error
+
+
+def read_task(section: object) -> Task:
+    """A task from plain data, by the ``name`` in it.
+
+    Raises:
+        ConfigError: there is no such task, or it cannot be made of these parameters.
+    """
+    return _task(section)[1]
 
 
 def _chosen(registry: Mapping[str, type[_Part]], key: str, values: object) -> _Part:

@@ -8,7 +8,8 @@ import gymnasium
 from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.world import GridTask
-from exneat_cli.tasks.robots.ant import AntTask
+from exneat_cli.tasks.gym import GymTask
+from exneat_cli.tasks.robots.robot import AntTask, RobotTask
 from exneat_cli.tasks.task import (
     ENDED,
     FAILED,
@@ -19,14 +20,17 @@ from exneat_cli.tasks.task import (
     Part,
     Simulation,
     Task,
+    setting,
 )
 
 TASKS: dict[str, type[Task]] = {
     "ant": AntTask,
+    "robot": RobotTask,
     "track_maze": TrackMaze,
     "general_maze": GeneralMaze,
     "foraging": Foraging,
     "hunting": Hunting,
+    "gym": GymTask,
 }
 """Every task by the name it has in `conf/task`."""
 

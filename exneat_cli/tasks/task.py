@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,6 +19,11 @@ FAILED = 2
 """The simulation exploded or a value was not finite; nothing that it gave counts."""
 
 
+def setting(name: str, default: Any) -> Any:
+    """A dataclass field whose setting is called `name`, where the field itself cannot be: ``parts`` is a property."""
+    return field(default=default, metadata={"setting": name})
+
+
 @dataclass(frozen=True)
 class Part:
     """A part of the body with its own sensors, and maybe its own actuators.
@@ -27,12 +33,24 @@ class Part:
         sensors: entries of what brains sense that this part senses.
         actuators: entries of the action that move this part.
         position: (x, y) of the part seen from the trunk, x ahead and y to the left, in the task's length unit.
+        height: of the part above the trunk's origin, in the same unit.
+        likeness: number of the class of parts that are built alike; -1 where nobody compared them.
+        is_mirrored: whether it is a mirrored one of the first part of its class.
+        joints: those of its sensors that are positions and velocities of its joints.
+        mirrored_joints: the entries that mirrored parts read instead.
+        trunk: entries of the trunk as seen from this part.
     """
 
     name: str
     sensors: tuple[int, ...]
     actuators: tuple[int, ...]
     position: tuple[float, float]
+    height: float = 0.0
+    likeness: int = -1
+    is_mirrored: bool = False
+    joints: tuple[int, ...] = ()
+    mirrored_joints: tuple[int, ...] = ()
+    trunk: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -125,6 +143,38 @@ class Task(ABC):
         """Length of what brains sense: the readings, unless the world has a `sense` of its own."""
         return self.observation_size
 
+    def identity(self) -> dict[str, Any]:
+        """The parameters that make two tasks the same, as plain data for a run's hash."""
+        plain = self.to_plain()  # the order of parts counts, since geometry vectors go by it
+        return {key: list(value.items()) if isinstance(value, dict) else value for key, value in plain.items()}
+
+    def files(self) -> dict[str, bytes]:
+        """Contents of the files that the task is made of, which a run keeps, by their relative paths."""
+        return {}
+
+    @classmethod
+    def found_in(cls, section: Mapping[str, Any], directory: Path) -> dict[str, Any]:
+        """Parameters as a run recorded them, reading `files` where it keeps them."""
+        return dict(section)
+
+    def shared_by(self, subpopulations: Sequence[int]) -> Task:
+        """The task once it is known which subpopulation each part belongs to, (parts,)."""
+        return self
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """What is sensed, entry by entry, with its unit if it has one."""
+        return tuple(f"sensor {entry}" for entry in range(self.sensed_size))
+
+    def remarks_on(self, part: Part) -> dict[str, str]:
+        """What else there is to say of a part, by a word."""
+        return {}
+
+    @property
+    def whole(self) -> tuple[int, ...]:
+        """Entries of what is sensed for a single network that senses everything, each thing once."""
+        return tuple(range(self.sensed_size))
+
     @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest sensible action, one entry per actuator."""
@@ -135,6 +185,11 @@ class Task(ABC):
     def resting_action(self) -> NDArray[np.float64]:
         """The action that does nothing, (actuators,)."""
         return np.zeros(len(self.actuator_names))
+
+    def to_plain(self) -> dict[str, Any]:
+        """The parameters as plain data, by the names of their settings, see `setting`."""
+        values = asdict(self)  # type: ignore[call-overload]
+        return {each.metadata.get("setting", each.name): values[each.name] for each in fields(self)}  # type: ignore[arg-type]
 
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""
@@ -152,6 +207,9 @@ class HasTiles(Protocol):
 @runtime_checkable
 class HasInitialPose(Protocol):
     """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
+
+    def usual_reset_scale(self) -> float:
+        """The size of this noise unless told otherwise."""
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world, with noise of this size on the initial pose."""

@@ -1,7 +1,7 @@
 """Linkage: which extra pins run between modules. A linkage is one function, found by its name in `LINKAGES`.
 
-Links read the value of the previous step. Source: Zhang (2025), sections 3.1.1 and 3.2.3; the thesis'
-"linked" agents are `hidden` (34 inputs = 22 sensors + 3 peers x 4 hidden nodes).
+Links between modules read the value of the previous step. Source: Zhang (2025), sections 3.1.1 and 3.2.3; the thesis'
+"linked" agents are `hidden` (34 inputs = 22 sensors + 3 peers x 4 hidden nodes). `joints` reads sensors, of this step.
 """
 
 from __future__ import annotations
@@ -18,15 +18,21 @@ serves part k, and the central module has the number ``len(parts)``; the nodes o
 outputs, from 0 on, then ``hidden_nodes`` initial ones. What a linkage needs follows from the pins that it returns."""
 
 
-def counter_clockwise(parts: Sequence[Part], own: int) -> list[int]:
-    """The other parts, counter-clockwise (seen from above) from part `own`.
+def peers_of(parts: Sequence[Part], own: int) -> list[int]:
+    """The other parts, counter-clockwise (seen from above) from part `own`; clockwise from a mirrored one.
 
     A shared genome so sees the same relation everywhere: on Ant the first peer of the front left leg is
-    the back left one, and the first peer of the back left leg the back right one.
+    the back left one, and the first peer of the back left leg the back right one. Equal angles are ordered by class of
+    alike parts, then by height.
     """
     angles = [math.atan2(y, x) for x, y in (part.position for part in parts)]
-    others = [index for index in range(len(parts)) if index != own]
-    return sorted(others, key=lambda index: (angles[index] - angles[own]) % math.tau)
+    way = -1.0 if parts[own].is_mirrored else 1.0
+
+    def order(peer: int) -> tuple[float, int, float]:
+        angle = round(way * (angles[peer] - angles[own]), 9) % round(math.tau, 9)
+        return angle, parts[peer].likeness, parts[peer].height
+
+    return sorted((peer for peer in range(len(parts)) if peer != own), key=order)
 
 
 def none(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
@@ -36,19 +42,19 @@ def none(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: 
 
 def output(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The outputs of every other part module."""
-    peers = counter_clockwise(parts, own)
+    peers = peers_of(parts, own)
     return tuple(Pin(k, peer, delayed=True) for peer in peers for k in range(outputs[peer]))
 
 
 def hidden(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The initial hidden nodes of every other part module."""
-    peers = counter_clockwise(parts, own)
+    peers = peers_of(parts, own)
     return tuple(Pin(outputs[peer] + k, peer, delayed=True) for peer in peers for k in range(hidden_nodes))
 
 
 def feedback(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
     """The outputs of the central module, first those that move the own part, then those of its peers."""
-    order = [own, *counter_clockwise(parts, own)]
+    order = [own, *peers_of(parts, own)]
     return tuple(Pin(actuator, len(parts), delayed=True) for k in order for actuator in parts[k].actuators)
 
 
@@ -57,5 +63,19 @@ def full(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: 
     return tuple(pin for linkage in (output, hidden, feedback) for pin in linkage(parts, own, outputs, hidden_nodes))
 
 
-LINKAGES: dict[str, Linkage] = {"none": none, "output": output, "hidden": hidden, "feedback": feedback, "full": full}
+def joints(parts: Sequence[Part], own: int, outputs: Sequence[int], hidden_nodes: int) -> tuple[Pin, ...]:
+    """The joints of every other part, of this step, with the signs that the own part sees them with."""
+    peers = [parts[peer] for peer in peers_of(parts, own)]
+    seen = [peer.mirrored_joints if parts[own].is_mirrored else peer.joints for peer in peers]
+    return tuple(Pin(entry) for entries in seen for entry in entries)
+
+
+LINKAGES: dict[str, Linkage] = {
+    "none": none,
+    "output": output,
+    "hidden": hidden,
+    "feedback": feedback,
+    "full": full,
+    "joints": joints,
+}
 """Every linkage by its name on the command line."""

@@ -5,7 +5,8 @@ Source: Zhang (2025), section 3.1; the geometry `cross` as described there (the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_whole
@@ -13,10 +14,14 @@ from exneat_cli.tasks import Part, Task
 from exneat_cli.wiring.linkage import LINKAGES
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan
 
-QUADRUPED_VECTORS = {"fb": (0, 0, 1, 1), "lr": (0, 1, 0, 1), "cross": (0, 1, 1, 0)}
-"""Geometry vectors that need four legs, for the order front left, front right, back left, back right."""
-QUADRUPED_PARTS = {"front_left", "front_right", "back_left", "back_right"}
-GEOMETRIES = ("single", *QUADRUPED_VECTORS, "all", "custom")
+PRINTED_VECTORS = {"fb": (0, 0, 1, 1), "lr": (0, 1, 0, 1), "cross": (0, 1, 1, 0)}
+"""Geometries that follow from where parts stand: front and back, left and right, opposite each other. For Ant's legs,
+in whatever order, they are the vectors that the thesis prints."""
+_ANTS_LEGS = {"front_left", "front_right", "back_left", "back_right"}
+GEOMETRIES = ("single", *PRINTED_VECTORS, "auto", "all", "custom")
+TRUNK_MODES = ("none", "shared", "module")
+_ON_THE_LINE = 1e-6
+"""Length below which a part stands neither in front nor behind, neither left nor right."""
 
 
 @dataclass(frozen=True)
@@ -60,24 +65,55 @@ class Geometry:
             return (0,) * len(parts)
         if self.name == "all":
             return tuple(range(len(parts)))
-        if self.name in QUADRUPED_VECTORS:
-            if {part.name for part in parts} != QUADRUPED_PARTS:
-                raise ConfigError("geometry", "single, all or custom", self.name, f"this task has: {names}")
-            return QUADRUPED_VECTORS[self.name]
+        if self.name in PRINTED_VECTORS:
+            ants = {part.name for part in parts} == _ANTS_LEGS
+            return PRINTED_VECTORS[self.name] if ants else _by_position(self.name, parts)
+        if self.name == "auto":
+            if any(part.likeness < 0 for part in parts):
+                raise ConfigError("geometry", "single, all or custom", "auto", f"nobody compared these parts: {names}")
+            return _numbered([part.likeness for part in parts])
         assert self.vector is not None
         if len(self.vector) != len(parts):
             raise ConfigError("geometry.vector", f"{len(parts)} entries, one for each of {names}", list(self.vector))
-        first_seen = list(dict.fromkeys(self.vector))
-        return tuple(first_seen.index(entry) for entry in self.vector)
+        return _numbered(self.vector)
+
+
+def _numbered(groups: Sequence[Hashable]) -> tuple[int, ...]:
+    """Groups by number, in the order in which they come."""
+    first_seen = list(dict.fromkeys(groups))
+    return tuple(first_seen.index(group) for group in groups)
+
+
+def _by_position(name: str, parts: Sequence[Part]) -> tuple[int, ...]:
+    """The vector of a geometry in `PRINTED_VECTORS`, for parts that stand accordingly."""
+    if name == "cross":
+        across = [[p for p, other in enumerate(parts) if _are_opposite(part, other)] for part in parts]
+        if all(len(others) == 1 for others in across):
+            return _numbered([min(own, *others) for own, others in enumerate(across)])
+        place = "in pairs opposite each other"
+    else:
+        axis = 0 if name == "fb" else 1
+        if all(abs(part.position[axis]) > _ON_THE_LINE for part in parts):
+            return _numbered([part.position[axis] > 0.0 for part in parts])
+        place = "in front or behind" if name == "fb" else "on the left or on the right"
+    places = ", ".join(f"{part.name} at ({part.position[0]:.3g}, {part.position[1]:.3g})" for part in parts)
+    raise ConfigError("geometry", f"parts that all stand {place} for {name}", places, "use single, auto, all or custom")
+
+
+def _are_opposite(one: Part, other: Part) -> bool:
+    (x, y), (u, v) = one.position, other.position
+    return math.hypot(x, y) > _ON_THE_LINE and math.hypot(x + u, y + v) <= _ON_THE_LINE
 
 
 @dataclass(frozen=True)
 class Wiring:
-    """The central module's settings.
+    """What else there is besides part modules, and how they are connected with it.
 
     Attributes:
-        central: whether there is a central module; None means yes where the task has a trunk.
+        central: whether there is a central module; None means yes where the task has a trunk and `trunk` is ``none``.
         output_width: outputs of each part module where a central module reads them.
+        trunk: without a central module: ``shared`` lets every part module sense the trunk as well, ``module`` adds one
+            that senses the trunk and drives the trunk's own joints.
 
     Raises:
         ConfigError: a value is out of range.
@@ -85,8 +121,10 @@ class Wiring:
 
     central: bool | None = None
     output_width: int = 2
+    trunk: str = "none"
 
     def __post_init__(self) -> None:
+        check_choice("wiring.trunk", self.trunk, TRUNK_MODES)
         if self.central is not None:
             check_flag("wiring.central", self.central)
         check_whole("wiring.output_width", self.output_width, 1, 100)
@@ -95,7 +133,7 @@ class Wiring:
 def plan_body(task: Task, *, hidden: int) -> Plan:
     """The plan of one module that senses and drives everything, with this many initial hidden nodes."""
     actuators = tuple(range(len(task.actuator_names)))
-    pins = tuple(map(Pin, range(task.sensed_size)))
+    pins = tuple(map(Pin, task.whole))
     body = Module("body", (0.0, 0.0), 0, pins, outputs=len(actuators), hidden=hidden, drives=actuators)
     return Plan((body,), task.sensed_size, len(actuators))
 
@@ -124,7 +162,7 @@ def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *
             name=part.name,
             position=part.position,
             subpopulation=subpopulations[own],
-            pins=(*map(Pin, part.sensors), *links[own]),
+            pins=(*map(Pin, part.sensors), *map(Pin, part.trunk if wiring.trunk == "shared" else ()), *links[own]),
             outputs=outputs[own],
             hidden=hidden,
             drives=() if central else part.actuators,
@@ -137,16 +175,33 @@ def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *
             raise ConfigError("geometry", "sharers of equal widths (inputs, hidden nodes, outputs)", widths)
     if central:
         modules.append(_central_module(task, modules, hidden))
+    elif wiring.trunk == "module":
+        modules.append(_trunk_module(task, modules, hidden))
     return Plan(tuple(modules), task.sensed_size, len(task.actuator_names))
 
 
 def _has_central(task: Task, wiring: Wiring) -> bool:
-    central = task.trunk is not None if wiring.central is None else wiring.central
-    if central and task.trunk is None:
-        raise ConfigError("wiring.central", "false", True, f"task={task.name} has no trunk for a central module")
+    """Whether there is a central module; refuses settings of the trunk that do not go with that."""
+    named, trunk = f"task={task.name}", task.trunk
+    central = trunk is not None and wiring.trunk == "none" if wiring.central is None else wiring.central
+    if trunk is None and (central or wiring.trunk != "none"):
+        key, value = ("wiring.central", True) if central else ("wiring.trunk", wiring.trunk)
+        raise ConfigError(key, "false" if central else "none", value, f"{named} has no trunk for a module or to share")
+    if central and wiring.trunk != "none":
+        fix = "a central module senses the trunk and drives all joints already"
+        raise ConfigError("wiring.trunk", "none together with wiring.central=true", wiring.trunk, fix)
     if not central and wiring.output_width != Wiring().output_width:
         fix = "without a central module each part module has one output per actuator"
         raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, fix)
+    if trunk is not None and not central:
+        driven = ", ".join(task.actuator_names[actuator] for actuator in trunk.actuators)
+        if driven and wiring.trunk != "module":
+            fix = "or set wiring.central=true"
+            raise ConfigError("wiring.trunk", f"module, for nobody else drives {driven}", wiring.trunk, fix)
+        if wiring.trunk == "module" and not driven:
+            raise ConfigError(
+                "wiring.trunk", "none or shared", "module", f"the trunk of {named} has no joints to drive"
+            )
     return central
 
 
@@ -156,6 +211,8 @@ def _links(task: Task, linkage: str, outputs: Sequence[int], hidden: int, *, cen
     # Without hidden nodes a linkage that reads them would return no pins and pass unnoticed.
     links = [LINKAGES[linkage](parts, own, outputs, max(1, hidden)) for own in range(len(parts))]
     pins = [pin for own in links for pin in own]
+    if linkage != "none" and len(parts) > 1 and not pins:
+        raise ConfigError("linkage", "links that find something to read", linkage, f"task={task.name} has nothing such")
     if not central and any(pin.module == len(parts) for pin in pins):
         fix = "these links read a central module: set wiring.central=true"
         if task.trunk is None:
@@ -182,6 +239,19 @@ def _central_module(task: Task, encoders: Sequence[Module], hidden: int) -> Modu
     )
 
 
+def _trunk_module(task: Task, modules: Sequence[Module], hidden: int) -> Module:
+    assert task.trunk is not None
+    return Module(
+        name=task.trunk.name,
+        position=task.trunk.position,
+        subpopulation=1 + max(module.subpopulation for module in modules),
+        pins=tuple(map(Pin, task.trunk.sensors)),
+        outputs=len(task.trunk.actuators),
+        hidden=hidden,
+        drives=task.trunk.actuators,
+    )
+
+
 def refuse_modules(algorithm: str, geometry: Geometry, linkage: str, wiring: Wiring) -> None:
     """Refuse settings of modules for an algorithm that has none.
 
@@ -195,5 +265,7 @@ def refuse_modules(algorithm: str, geometry: Geometry, linkage: str, wiring: Wir
         raise ConfigError("linkage", "none, its default", linkage, fix)
     if wiring.central:
         raise ConfigError("wiring.central", "null or false", True, fix)
-    if wiring.output_width != Wiring().output_width:
-        raise ConfigError("wiring.output_width", f"{Wiring().output_width}, its default", wiring.output_width, fix)
+    for key in ("output_width", "trunk"):
+        default, came = getattr(Wiring(), key), getattr(wiring, key)
+        if came != default:
+            raise ConfigError(f"wiring.{key}", f"{default}, its default", came, fix)

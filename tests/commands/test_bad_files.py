@@ -89,7 +89,7 @@ def test_a_configuration_that_is_not_the_one_of_a_run_is_refused(
         b"\tseed: 1\n": "mine/config.yaml:1: cannot be read as YAML",
         b"seed: 1\nseed: 2\n": "mine/config.yaml:2: cannot be read as YAML: found duplicate key seed",
         b"sed: 1\n": "sed: unknown key",
-        b"task: {name: atn}\n": "task: expected one of",
+        b"task: {name: atn}\n": "task.name: expected one of",
     }.items():
         config.write_bytes(content)
         check_refusal(["train", "--config-path", "mine", "output=out"], [named], tmp_path, capfd)

@@ -93,7 +93,7 @@ def test_every_level_of_every_sweep_suits_the_tasks_that_it_names(sweep: str) ->
     entry = yaml.safe_load((shipped_directory("conf") / "sweep" / f"{sweep}.yaml").read_text())["sweeps"][sweep]
     assert entry["levels"]
     for task in entry["levels"]:
-        (asked,) = read_job("", read_command_line("train", [f"task={task}", f"sweep={sweep}"]).compose()).sweeps
+        (asked,) = read_job("", read_command_line("train", [f"task={task}", f"sweep={sweep}"])).sweeps
         for level in asked.levels:
             perturbed(TASKS[task](), Noise(), asked, level)
 

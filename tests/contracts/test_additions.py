@@ -65,7 +65,8 @@ def step(world: CorridorWorld, action: NDArray[np.float64], terms: NDArray[np.fl
     world.place[0] += 1 if action[1] > action[0] else -1
     world.place[2] += 1
     terms[0] = 1.0 if world.place[0] == world.place[1] else 0.0
-    return ENDED if world.place[0] <= 0 or world.place[0] >= world.size - 1 else RUNNING
+    at_an_end = world.place[0] <= 0 or world.place[0] >= world.size - 1
+    return ENDED if at_an_end or world.place[2] == world.size else RUNNING
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ def reads(linkage: str, body: Task, *, hidden: int) -> tuple[bool, bool]:
     """Whether it reads a central module, and hidden nodes of part modules."""
     parts, outputs = body.parts, 2
     links = [LINKAGES[linkage](parts, own, (outputs,) * len(parts), hidden) for own in range(len(parts))]
-    pins = [pin for own in links for pin in own]
+    pins = [pin for own in links for pin in own if not pin.is_sensor]
     of_parts = [pin for pin in pins if pin.module < len(parts)]
     return len(of_parts) < len(pins), any(pin.index >= outputs for pin in of_parts)
 
@@ -35,6 +35,10 @@ def test_pins_exist_and_sharers_have_equal_widths_unless_a_linkage_reads_what_is
     body = TASKS[task]()
     wiring = Wiring(central=central and body.trunk is not None)
     reads_central, reads_hidden = reads(linkage, body, hidden=3)
+    if linkage == "joints" and len(body.parts) > 1 and not any(part.joints for part in body.parts):
+        with pytest.raises(ConfigError, match=r"^linkage: expected links that find something to read"):
+            plan_modules(body, Geometry(geometry), linkage, wiring, hidden=hidden)
+        return
     if (reads_central and not wiring.central) or (reads_hidden and hidden == 0):
         with pytest.raises(ConfigError, match=r"^linkage: expected links that read no"):
             plan_modules(body, Geometry(geometry), linkage, wiring, hidden=hidden)

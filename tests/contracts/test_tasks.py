@@ -15,7 +15,7 @@ from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes
 from exneat_cli.tasks import ENDED, FAILED, RUNNING, TASKS, HasFullReward, HasInitialPose, HasTiles, Simulation, Task
 
-SHORT: dict[str, dict[str, Any]] = {"ant": {"max_steps": 60, "patience": 15}}
+SHORT: dict[str, dict[str, Any]] = {name: {"max_steps": 60, "patience": 15} for name in ("ant", "robot")}
 
 
 @pytest.fixture(params=sorted(TASKS))
@@ -75,7 +75,8 @@ def test_sensors_and_actuators_of_the_parts_exist_and_do_not_overlap(task: Task)
     places = [*task.parts, *([task.trunk] if task.trunk else [])]
     sensors = [index for place in places for index in place.sensors]
     actuators = [index for place in places for index in place.actuators]
-    assert sorted(sensors) == list(range(task.sensed_size))
+    assert sorted(sensors) == sorted(task.whole)
+    assert set(task.whole) <= set(range(task.sensed_size))
     assert len(set(actuators)) == len(actuators)
     assert set(actuators) <= set(range(len(task.actuator_names)))
     assert len({part.name for part in task.parts}) == len(task.parts)

@@ -6,7 +6,9 @@ import csv
 import dataclasses
 import importlib.util
 import json
+import shutil
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -116,8 +118,9 @@ def test_running_a_champion_takes_25_lines_besides_imports_and_documentation() -
     ],
 )
 def test_what_an_example_adds_trains_is_tested_and_resumes_to_the_same_history(
-    example: str, choice: list[str], variant: str
+    example: str, choice: list[str], variant: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.syspath_prepend(str(EXAMPLES))  # workers look where this process does
     load(example)
     asked = ["train", *CONF, *choice, "budget=smoke"]
     assert main([*asked, "generations=3"]) == 0
@@ -128,6 +131,25 @@ def test_what_an_example_adds_trains_is_tested_and_resumes_to_the_same_history(
     assert main([*asked, "generations=5", "resume=true"]) == 0
     undisturbed = RunSettings.from_plain({**read_yaml(run / "config.yaml"), "output": "undisturbed"})
     assert history_of(run) == history_of(train(undisturbed).directory.path)
+
+
+def test_the_task_goes_by_its_class_and_as_the_package_that_its_pyproject_makes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "custom_task", raising=False)
+    shutil.copy(EXAMPLES / "custom_task.py", tmp_path)
+    assert main(["train", "task=custom", "task.kind=custom_task:Corridor", "budget=smoke"]) == 0
+    project = tomllib.loads((EXAMPLES / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    metadata = tmp_path / "exneat_corridor-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 1.0\n")
+    lines = [f"{name} = {place}" for name, place in project["entry-points"]["exneat.tasks"].items()]
+    (metadata / "entry_points.txt").write_text("\n".join(["[exneat.tasks]", *lines]))
+    TASKS.pop("corridor", None)  # where importing the file put it, if nobody had imported it before
+    assert main(["train", "task=custom", "task.name=corridor", "budget=smoke"]) == 0
+    one, other = Path("outputs/corridor").iterdir()
+    assert history_of(one) == history_of(other)
 
 
 def test_the_lamp_of_the_corridor_is_found() -> None:

@@ -50,7 +50,7 @@ def started(path: Path, status: str, **others: Any) -> RunDirectory:
     known = {"variant": "neat", "task": "ant", "seed": 0, "configuration_hash": "hash", "generations": 5, **others}
     result = Result(champion=SCORE, standing_still=SCORE) if status == DONE else None
     manifest = Manifest(format=MANIFEST_FORMAT, status=status, result=result, **known)
-    run.begin(yaml.safe_dump(SETTINGS), manifest)
+    run.begin(yaml.safe_dump(SETTINGS), manifest, {})
     assert run.read_manifest() == manifest
     return run
 

@@ -20,8 +20,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from exneat_cli.errors import ConfigError, ExneatError
-from exneat_cli.rollouts import Executor, cluster, keep_clusters, settings
-from exneat_cli.rollouts.cluster import blocks, cluster_of, run_block, versions
+from exneat_cli.rollouts import Executor, cluster, keep_workers, settings
+from exneat_cli.rollouts.blocks import blocks, run_block, versions
+from exneat_cli.rollouts.workers import workers_of
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import AntTask, GeneralMaze, Task
 from exneat_cli.wiring import Geometry
@@ -36,7 +37,7 @@ PLAIN = Drifting(compiled=False)  # every worker would have to compile it anew
 @pytest.fixture(scope="module", autouse=True)
 def _one_cluster_for_all(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     threads, scratch = set(threading.enumerate()), tmp_path_factory.mktemp("scratch")
-    with pytest.MonkeyPatch.context() as patch, keep_clusters():
+    with pytest.MonkeyPatch.context() as patch, keep_workers():
         patch.setattr(tempfile, "tempdir", str(scratch))
         yield
     assert not workers_of_this_process()
@@ -54,7 +55,7 @@ def test_outcomes_and_moments_are_those_of_one_thread(task: Task, workers: int) 
 
 
 def test_a_cluster_at_an_address_does_as_well() -> None:
-    afar, brains = Executor("dask", address=cluster_of(TWO).client.scheduler.address), random_brains(9)
+    afar, brains = Executor("dask", address=workers_of(TWO).client.scheduler.address), random_brains(9)
     assert_equal(run(PLAIN, brains, afar), run(PLAIN, brains, SERIAL))
 
 
@@ -88,7 +89,7 @@ def test_an_error_in_a_worker_reaches_the_caller_and_leaves_the_cluster_usable(
     broken: Callable[..., Any], error: type[Exception], message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "run_block", broken)
-    monkeypatch.setattr(cluster_of(TWO)._own.scheduler, "allowed_failures", 0)
+    monkeypatch.setattr(workers_of(TWO)._own.scheduler, "allowed_failures", 0)
     with pytest.raises(error, match=message):
         run(PLAIN, random_brains(5), TWO)
     monkeypatch.undo()

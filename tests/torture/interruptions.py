@@ -113,7 +113,8 @@ def _commands(experiment: Path) -> list[_Command]:
     ]
     if find_spec("hydra_plugins.hydra_joblib_launcher"):
         commands.append(_Command("runs side by side", [*several, *_JOBLIB, "executor=serial"], ["resume=true"]))
-    return commands
+    processes = ["train", "task=gym", "budget=smoke", "population=40", "generations=16", "executor.workers=2"]
+    return [*commands, _Command("in processes", processes, ["resume=true"])]
 
 
 def _try(
@@ -123,7 +124,7 @@ def _try(
     name = f"{command.name}, {signal.Signals(kind).name} after {moment:.2f} s"
     with Program([*command.arguments, "output=out"], folder) as program:
         time.sleep(moment)
-        running = program.code is None
+        running, heard = program.code is None, program.listens
         sent = time.monotonic()
         # A terminal sends Ctrl-C to all processes of the group, a scheduler SIGTERM to the first one alone.
         program.send(kind, to_all=kind == signal.SIGINT)
@@ -131,7 +132,7 @@ def _try(
         while program.left_over() and time.monotonic() - sent < _LONGEST_WAIT:
             time.sleep(0.01)
         seconds = time.monotonic() - sent
-        stop = _judge(name, program, kind, code, seconds, mistakes, running=running)
+        stop = _judge(name, program, kind, code, seconds, mistakes, running=running, heard=heard)
     with Program([*command.arguments, *command.resume, "output=out"], folder) as again:
         if again.wait(HANGING) != 0:
             mistakes.add(f"{name}: did not go on: {again.errors[-300:]}")
@@ -142,12 +143,22 @@ def _try(
 
 
 def _judge(
-    name: str, program: Program, kind: int, code: int | None, seconds: float, mistakes: Mistakes, *, running: bool
+    name: str,
+    program: Program,
+    kind: int,
+    code: int | None,
+    seconds: float,
+    mistakes: Mistakes,
+    *,
+    running: bool,
+    heard: bool,
 ) -> _Stop:
     """What the process did, with complaints about what it should not have done."""
     left = len(program.left_over())
     files = len(list((program.temporary.parent / "out").rglob("*.tmp")))
     errors = program.errors.strip()
+    if code == 0 and running and not heard:
+        return _Stop(0.0, left, files, "lost in the start of Python")
     if left or files or seconds > BAR:
         say(f"  {name}: {seconds:.1f} s, exit code {code}, {left} processes and {files} temporary files left")
     if code == 0:

@@ -73,6 +73,15 @@ class Program:
         """What it has written to standard output."""
         return self._out.read_text(encoding="utf-8", errors="replace")
 
+    @property
+    def listens(self) -> bool:
+        """Whether it handles SIGTERM by now: Python itself, which starts first, does not, and may lose a SIGINT."""
+        with contextlib.suppress(OSError):
+            status = Path(f"/proc/{self.id}/status").read_text(encoding="ascii")
+            caught = int(status.partition("SigCgt:")[2].split()[0], 16)
+            return bool(caught >> (signal.SIGTERM - 1) & 1)
+        return False
+
     def send(self, number: int, *, to_all: bool) -> None:
         """Send a signal to the process, or to its whole group, as a terminal does."""
         with contextlib.suppress(ProcessLookupError):

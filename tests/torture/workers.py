@@ -67,7 +67,8 @@ def _settings(task: str, algorithm: str, seed: int) -> RunSettings:
 
 
 def _executors() -> list[Executor]:
-    return [Executor("serial"), *(Executor(name, workers) for name in ("threads", "dask") for workers in _WORKERS)]
+    several = [Executor(name, workers) for name in ("threads", "dask") for workers in _WORKERS]
+    return [Executor("serial"), *several, Executor("processes", 2)]
 
 
 def _named(executor: Executor) -> str:

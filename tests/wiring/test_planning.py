@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings
 from exneat_cli.errors import ConfigError
 from exneat_cli.tasks import AntTask, Part, Task
-from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, counter_clockwise, plan_body, plan_modules
+from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, peers_of, plan_body, plan_modules
 
 AROUND = ["front_left", "back_left", "back_right", "front_right"]
 
@@ -50,7 +50,7 @@ def test_peers_come_counter_clockwise_from_the_own_leg() -> None:
     legs = AntTask().parts
     for own, leg in enumerate(legs):
         start = AROUND.index(leg.name)
-        assert [legs[peer].name for peer in counter_clockwise(legs, own)] == (AROUND * 2)[start + 1 : start + 4]
+        assert [legs[peer].name for peer in peers_of(legs, own)] == (AROUND * 2)[start + 1 : start + 4]
 
 
 def test_links_of_a_shared_genome_mean_the_same_at_every_leg_and_are_delayed() -> None:
@@ -207,7 +207,7 @@ def test_single_and_all_fit_any_number_of_parts(count: int) -> None:
 
 @pytest.mark.parametrize("name", ["fb", "lr", "cross"])
 def test_leg_geometries_are_refused_without_legs(name: str) -> None:
-    with pytest.raises(ConfigError, match="geometry: expected single, all or custom"):
+    with pytest.raises(ConfigError, match=f"geometry: expected parts that all stand .* for {name}, got"):
         Geometry(name).subpopulations(parts(4))
 
 

@@ -55,6 +55,9 @@ class GridTask(Task):
     observation_limits: ClassVar[tuple[float, float]] = (0.0, 1.0)
     observation_size: ClassVar[int] = 4 * CHANNELS
     actuator_names: ClassVar[tuple[str, ...]] = MOVES
+    sensor_names: ClassVar[tuple[str, ...]] = tuple(
+        f"{way}, {channel} channel" for way in ("left", "right", "up", "down") for channel in ("first", "second")
+    )
     parts: ClassVar[tuple[Part, ...]] = (
         Part("left", sensors=(0, 1), actuators=(0,), position=(-1.0, 0.0)),
         Part("right", sensors=(2, 3), actuators=(1,), position=(1.0, 0.0)),

@@ -1,7 +1,7 @@
-"""The compiled episode of Ant: reset, rewind, observe, step and locate over MuJoCo's own memory.
+"""The compiled episode of a robot: reset, rewind, observe, sense, drive, step and locate over MuJoCo's own memory.
 
-Written over index lists and sizes taken from the model, so any legged model fits. Follows Gymnasium's
-Ant-v5 (Farama Foundation, 2024) operation by operation, so that results agree to the last bits.
+Written over index lists and sizes taken from the model. Follows Gymnasium's v5 environments (Farama Foundation, 2024)
+operation by operation, so that results agree to the last bits.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
 from exneat_cli.errors import ExneatError
+from exneat_cli.tasks.robots.frames import Frames, sense_in_frames
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 
 _SYMBOLS = ("mj_step", "mj_forward", "mj_resetData", "mj_rnePostConstraint")
@@ -30,33 +31,51 @@ _functions: list[Any] = [types.ExternalFunction(name, types.void(types.int64, ty
 mj_step, mj_forward, mj_resetData, mj_rnePostConstraint = _functions
 
 STEPS, STUCK_STEPS, WARNINGS = range(3)
-"""Entries of `AntWorld.clock`: steps done, steps without progress, MuJoCo's warnings at the reset."""
+"""Entries of `RobotWorld.clock`: steps done, steps without progress, MuJoCo's warnings at the reset."""
 
 
-class AntWorld(NamedTuple):
+class RobotWorld(NamedTuple):
     """MuJoCo's memory as NumPy views, and the rules of an episode."""
 
     model: int  #: address of the C structure `mjModel`
-    data: int  #: address of `mjData`, of which the next six are views
+    data: int  #: address of `mjData`, of which the next seven are views
     qpos: NDArray[np.float64]  #: (nq,), m, rad and quaternions
     qvel: NDArray[np.float64]  #: (nv,), m/s and rad/s
     ctrl: NDArray[np.float64]  #: (nu,)
     xpos: NDArray[np.float64]  #: (nbody, 3), m
+    xipos: NDArray[np.float64]  #: (nbody, 3), m, centres of mass
     cfrc_ext: NDArray[np.float64]  #: (nbody, 6), N m and N
     warnings: NDArray[np.int32]  #: counters
     initial_qpos: NDArray[np.float64]  #: the pose that a reset disturbs
     start_qpos: NDArray[np.float64]  #: what the reset made of it
     start_qvel: NDArray[np.float64]
-    trunk: int  #: body whose height and x position count
+    positions: NDArray[np.int64]  #: entries of `qpos` that are read
+    velocities: NDArray[np.int64]  #: entries of `qvel`
+    bodies: NDArray[np.int64]  #: whose contact forces are read
+    frames: Frames  #: how readings become what parts sense
+    trunk: int  #: body whose place counts
+    masses: NDArray[np.float64]  #: (nbody,) whose common centre's speed counts; (0,) where the trunk's does
+    along: int  #: entry of `qpos` whose speed counts; -1 where the trunk's does
+    middle: NDArray[np.float64]  #: (nu,) control of an action of 0
+    span: NDArray[np.float64]  #: (nu,) what an action of 1 adds
     substeps: int  #: physics steps per control step
     control_period: float  #: seconds per control step
-    reset_scale: float  #: half-width of the uniform noise on positions (rad, m), sd of that on velocities
+    reset_scale: float  #: half-width of the uniform noise on positions (rad, m)
+    normal: bool  #: whether noise on velocities is normal with this sd, not uniform
+    height: int  #: entry of `qpos` that is the trunk's height; -1 where nothing is unhealthy
+    above: float  #: m to add to it
     lowest: float  #: healthy height of the trunk in m
     highest: float
+    pitch: int  #: entry of `qpos` that must stay between -steepest and steepest (rad); -1: none
+    steepest: float
+    largest: float  #: healthy size of all velocities, and of all positions from the third on
     force_limit: float  #: contact forces are clipped to [-force_limit, force_limit]
-    healthy_reward: float  #: weights of the reward terms
+    forward_weight: float  #: weights of the reward terms
+    healthy_reward: float
     control_weight: float
     contact_weight: float
+    cost_limit: float  #: contact forces are clipped to this in the contact cost
+    largest_contact_cost: float
     max_steps: int  #: control steps after which an episode ends
     progress: float  #: m without which an episode ends after `patience` steps
     patience: int  #: 0: never
@@ -89,18 +108,21 @@ def load_library() -> None:
 
 
 @compiled
-def reset(world: AntWorld, rng: Generator) -> None:
-    """Put the body near its initial pose, as Gymnasium's Ant does with the same generator."""
-    # Uniform noise on all positions, then normal noise on all velocities.
+def reset(world: RobotWorld, rng: Generator) -> None:
+    """Put the body near its initial pose, as Gymnasium does with the same generator."""
+    # Noise on all positions, then on all velocities.
     for i in range(world.qpos.size):
         world.start_qpos[i] = world.initial_qpos[i] + rng.uniform(-world.reset_scale, world.reset_scale)
     for i in range(world.qvel.size):
-        world.start_qvel[i] = world.reset_scale * rng.standard_normal()
+        if world.normal:
+            world.start_qvel[i] = world.reset_scale * rng.standard_normal()
+        else:
+            world.start_qvel[i] = rng.uniform(-world.reset_scale, world.reset_scale)
     rewind(world)
 
 
 @compiled
-def rewind(world: AntWorld) -> None:
+def rewind(world: RobotWorld) -> None:
     """Put the body back to where the last reset had put it."""
     # MuJoCo forgets all that the episode left behind.
     mj_resetData(world.model, world.data)
@@ -118,29 +140,42 @@ def rewind(world: AntWorld) -> None:
 
 
 @compiled
-def observe(world: AntWorld, observation: NDArray[np.float64]) -> None:
-    """Write positions without the trunk's x and y, velocities, and the clipped contact forces of all bodies."""
+def observe(world: RobotWorld, observation: NDArray[np.float64]) -> None:
+    """Write positions but for the place on the ground, velocities, and clipped contact forces."""
     k = 0
-    for i in range(2, world.qpos.size):
+    for i in world.positions:
         observation[k] = world.qpos[i]
         k += 1
-    for i in range(world.qvel.size):
+    for i in world.velocities:
         observation[k] = world.qvel[i]
         k += 1
-    for body in range(1, world.cfrc_ext.shape[0]):  # 0 is the world
+    for body in world.bodies:
         for i in range(world.cfrc_ext.shape[1]):
             observation[k] = min(max(world.cfrc_ext[body, i], -world.force_limit), world.force_limit)
             k += 1
 
 
 @compiled
-def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
+def sense(world: RobotWorld, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
+    """Write what the parts sense in their own frames."""
+    sense_in_frames(world.frames, readings, sensed)
+
+
+@compiled
+def drive(world: RobotWorld, action: NDArray[np.float64]) -> None:
+    """Turn an action in the parts' own sense into one in the joints'."""
+    for i in range(action.size):
+        action[i] *= world.frames.action_signs[i]
+
+
+@compiled
+def step(world: RobotWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
     """Do one control step; `terms`, (4,), become its forward, healthy, control and contact reward."""
     for i in range(action.size):
         if not np.isfinite(action[i]):
             return FAILED
-        world.ctrl[i] = action[i]
-    before = world.xpos[world.trunk, 0]
+        world.ctrl[i] = world.middle[i] + world.span[i] * action[i]
+    before = _place(world)
     for _ in range(world.substeps):
         mj_step(world.model, world.data)
     # mj_step leaves the contact forces of bodies uncomputed.
@@ -151,9 +186,8 @@ def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64
     if not (np.isfinite(world.qpos).all() and np.isfinite(world.qvel).all()):
         return FAILED
     # The episode ends with a fall or a jump, in time, or when training sees no progress.
-    height = world.qpos[2]
-    healthy = world.lowest <= height and height <= world.highest
-    _reward(world, action, before, healthy, terms)
+    healthy = _healthy(world)
+    _reward(world, before, healthy, terms)
     world.clock[STEPS] += 1
     if not healthy or world.clock[STEPS] >= world.max_steps or _stuck(world):
         return ENDED
@@ -161,21 +195,53 @@ def step(world: AntWorld, action: NDArray[np.float64], terms: NDArray[np.float64
 
 
 @compiled
-def _reward(world, action, before, healthy, terms):  # type: ignore[no-untyped-def]
-    # The trunk's velocity along x in m/s. After RK4 steps xpos lags behind qpos; Gymnasium takes xpos.
-    terms[0] = (world.xpos[world.trunk, 0] - before) / world.control_period
+def _place(world):  # type: ignore[no-untyped-def]
+    """X in m of what has to move: a slide, the centre of mass, or the trunk."""
+    if world.along >= 0:
+        return world.qpos[world.along]
+    if world.masses.size == 0:
+        return world.xpos[world.trunk, 0]  # lags behind qpos after RK4 steps; Gymnasium takes it
+    moment, mass = 0.0, 0.0
+    for body in range(world.masses.size):
+        moment += world.masses[body] * world.xipos[body, 0]
+        mass += world.masses[body]
+    return moment / mass
+
+
+@compiled
+def _healthy(world):  # type: ignore[no-untyped-def]
+    if world.height >= 0:
+        height = world.qpos[world.height] + world.above
+        if not (world.lowest <= height and height <= world.highest):
+            return False
+    if world.pitch >= 0 and abs(world.qpos[world.pitch]) >= world.steepest:
+        return False
+    if world.largest < np.inf:
+        for i in range(2, world.qpos.size):
+            if abs(world.qpos[i]) >= world.largest:
+                return False
+        for i in range(world.qvel.size):
+            if abs(world.qvel[i]) >= world.largest:
+                return False
+    return True
+
+
+@compiled
+def _reward(world, before, healthy, terms):  # type: ignore[no-untyped-def]
+    # Forward velocity along x in m/s.
+    terms[0] = world.forward_weight * ((_place(world) - before) / world.control_period)
     terms[1] = world.healthy_reward if healthy else 0.0
     effort = 0.0
-    for i in range(action.size):
-        effort += action[i] * action[i]
+    for i in range(world.ctrl.size):
+        effort += world.ctrl[i] * world.ctrl[i]
     terms[2] = -world.control_weight * effort
     # The world's own entries are part of the sum, as in Gymnasium.
     squared = 0.0
     for body in range(world.cfrc_ext.shape[0]):
         for i in range(world.cfrc_ext.shape[1]):
-            force = min(max(world.cfrc_ext[body, i], -world.force_limit), world.force_limit)
+            force = min(max(world.cfrc_ext[body, i], -world.cost_limit), world.cost_limit)
             squared += force * force
-    terms[3] = -world.contact_weight * squared
+    terms[3] = -min(world.contact_weight * squared, world.largest_contact_cost)
 
 
 @compiled
@@ -191,7 +257,7 @@ def _stuck(world):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def locate(world: AntWorld, row: NDArray[np.float64]) -> None:
+def locate(world: RobotWorld, row: NDArray[np.float64]) -> None:
     """Write x, y and z of the trunk in metres."""
     for i in range(3):
         row[i] = world.xpos[world.trunk, i]

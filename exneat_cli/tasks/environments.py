@@ -1,0 +1,128 @@
+"""Gymnasium environments: how one is made, and what goes into it and comes out of it."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import importlib
+import json
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from exneat_cli.errors import ConfigError
+from exneat_cli.tasks.user_code import make_findable
+
+
+class Interface(NamedTuple):
+    """What goes into an environment and comes out of it.
+
+    low, high: (A,) what -1 and 1 stand for; `space`: of the environment's actions; `first`: the smallest of several
+    actions, None if they are numbers; `max_steps`: its own limit, if it has one.
+    """
+
+    observation_size: int
+    actions: int
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    space: spaces.Space[Any]
+    first: int | None
+    max_steps: int | None
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether one of several actions is chosen."""
+        return self.first is not None
+
+    def taken(self, action: NDArray[np.float64]) -> Any:
+        """Our action, (A,), in the environment's own terms."""
+        if self.first is not None:
+            return self.first + int(np.argmax(action))
+        share = (np.clip(action, -1.0, 1.0) + 1.0) / 2.0
+        values = self.low + share * (self.high - self.low)
+        return values.astype(self.space.dtype).reshape(self.space.shape)
+
+
+@functools.lru_cache(64)
+def interface_of(env_id: str, kwargs: str) -> Interface:
+    """Make the environment once to see its spaces; `kwargs` is JSON."""
+    env = make(env_id, json.loads(kwargs), None)
+    try:
+        senses, acts = env.observation_space, env.action_space
+        max_steps = env.spec.max_episode_steps if env.spec else None
+    finally:
+        env.close()
+    if not isinstance(senses, spaces.Box) or senses.dtype.kind not in "biuf" or not senses.shape:
+        raise _unsupported(env_id, "observations in a Box of numbers", senses)
+    size = math.prod(senses.shape)
+    if isinstance(acts, spaces.Discrete):
+        none = np.zeros(0)
+        return Interface(size, int(acts.n), none, none, acts, int(acts.start), max_steps)
+    if not isinstance(acts, spaces.Box) or acts.dtype.kind != "f":
+        raise _unsupported(env_id, "actions that are Discrete or a Box of real numbers", acts)
+    low, high = acts.low.ravel().astype(float), acts.high.ravel().astype(float)
+    has_low, has_high = np.isfinite(low), np.isfinite(high)
+    # Two units wide where a bound is missing: -1 to 1, or from the other bound on.
+    lowest = np.where(has_low, low, np.where(has_high, high - 2.0, -1.0))
+    highest = np.where(has_high, high, np.where(has_low, low + 2.0, 1.0))
+    return Interface(size, len(low), lowest, highest, acts, None, max_steps)
+
+
+def _unsupported(env_id: str, expected: str, came: object) -> ConfigError:
+    fix = f"{env_id} has {str(came)[:200]}; a wrapper of gymnasium.wrappers may turn it into one"
+    return ConfigError("task.env_id", f"an environment with {expected}", env_id, fix)
+
+
+def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymnasium.Env[Any, Any]:
+    """Make an environment, or say in words why that cannot be."""
+    module, _, own_id = env_id.rpartition(":")
+    if module:
+        _import(module, env_id)
+    # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # advice about versions and spaces
+            env = gymnasium.make(own_id, max_episode_steps=max_steps, disable_env_checker=True, **kwargs)
+    except (gymnasium.error.DependencyNotInstalled, ImportError) as error:
+        raise ConfigError("task.env_id", "an environment that is installed", env_id, in_words(error)) from error
+    except gymnasium.error.Error as error:
+        raise _unknown(env_id) from error
+    except Exception as error:  # whatever its constructor raises
+        if kwargs:
+            expected = f"arguments that {env_id} takes"
+            raise ConfigError("task.kwargs", expected, dict(kwargs), in_words(error)) from error
+        raise ConfigError("task.env_id", "an environment that can be made", env_id, in_words(error)) from error
+    if env.spec is None or env.spec.id != own_id:
+        raise _unknown(env_id)  # Gymnasium takes the newest version where none is named
+    return env
+
+
+def _import(module: str, env_id: str) -> None:
+    """Import what registers an environment; whoever may not have that done is refused before, see `find_task`."""
+    make_findable(module.partition(".")[0])
+    try:
+        importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # whatever its code does
+        expected = "a module that can be imported from here, a colon and an id"
+        raise ConfigError("task.env_id", expected, env_id, in_words(error)) from error
+
+
+def _unknown(env_id: str) -> ConfigError:
+    close = difflib.get_close_matches(env_id.rpartition(":")[2], gymnasium.registry, n=1, cutoff=0.5)
+    fix = (
+        f"did you mean {close[0]}?" if close else "python -c 'import gymnasium; gymnasium.pprint_registry()' lists them"
+    )
+    return ConfigError("task.env_id", "the id of a registered environment, with its version", env_id, fix)
+
+
+def in_words(error: BaseException) -> str:
+    """An error of any code in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:300]

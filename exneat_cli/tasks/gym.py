@@ -1,0 +1,248 @@
+"""Any Gymnasium environment that gives a Box of numbers and takes a Box of numbers or one of several actions.
+
+It runs in plain Python, which is slower than the compiled tasks. Its observation, of whatever shape, is laid out flat
+in C order, and so is a Box of actions:
+
+| action space | entries of our action | meaning |
+|---|---|---|
+| Box | one per number | -1 is the lowest and 1 the highest value; without bounds -1 and 1 are the values themselves |
+| Discrete | one per action | the largest wins, after U(0, 1e-3) is added to each so that ties break fairly |
+
+Scoring: the fitness of an episode is its return, the sum of its rewards.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import gymnasium
+import mujoco
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from exneat_cli.errors import (
+    ConfigError,
+    ExneatError,
+    check_choice,
+    check_keys,
+    check_real,
+    check_section,
+    check_text,
+    check_whole,
+)
+from exneat_cli.tasks.environments import Interface, in_words, interface_of, make
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task, setting
+
+LARGEST = 2**25
+"""Readings, or entries of actions, in a longest episode, 256 MiB: noise needs room for all of them."""
+_OURS = ("id", "max_episode_steps", "disable_env_checker")
+_ABOUT_THE_ACTION = (ArithmeticError, AssertionError, ValueError, gymnasium.error.InvalidAction, mujoco.FatalError)
+"""What environments raise over an action that they cannot take, or a state that it has led to."""
+
+
+@dataclass(frozen=True)
+class GymTask(Task):
+    """An environment by its id.
+
+    Attributes:
+        name: always ``gym``.
+        env_id: as `gymnasium.make` takes it; ``module:Env-v0`` imports the module first.
+        kwargs: plain data that the environment's constructor takes.
+        max_steps: control steps after which an episode ends, None for the environment's own limit.
+        failure_floor: fitness of an episode that failed; below any return that an ordinary one may have.
+        part_entries: ``{name: {"sensors": [...], "actuators": [...]}}``, the setting ``task.parts``: entries of the
+            observation and of the action of each part, in the order of geometry vectors; None makes one part of all.
+
+    Raises:
+        ConfigError: a value is out of range, or the environment does not exist, cannot be made or has other spaces.
+    """
+
+    name: str = "gym"
+    env_id: str = "CartPole-v1"
+    kwargs: Mapping[str, Any] = field(default_factory=dict)
+    max_steps: int | None = None
+    failure_floor: float = -10000.0  # type: ignore[misc]
+    part_entries: Mapping[str, Mapping[str, Sequence[int]]] | None = setting("parts", None)
+
+    terms: ClassVar[tuple[str, ...]] = ("reward",)
+    fitness_name: ClassVar[str] = "return"
+    fitness_decimals: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        check_choice("task.name", self.name, ["gym"])
+        check_text("task.env_id", self.env_id, "the id of a Gymnasium environment")
+        object.__setattr__(self, "kwargs", _checked_kwargs(self.kwargs))
+        check_real("task.failure_floor", self.failure_floor, -1e300)
+        if self.max_steps is not None:
+            check_whole("task.max_steps", self.max_steps, 1, 1_000_000)
+        elif self._interface.max_steps is None:
+            fix = f"{self.env_id} has no limit of its own"
+            raise ConfigError("task.max_steps", "a whole number from 1 to 1000000", None, fix)
+        largest = max(self.observation_size, len(self.actuator_names))
+        check_whole("task.max_steps", self.longest_episode, 1, LARGEST // largest)
+        if self.part_entries is not None:
+            _check_parts(self.part_entries, self.observation_size, len(self.actuator_names))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Those of the setting, evenly around a circle for want of other places; or one of everything."""
+        if self.part_entries is None:
+            everything = tuple(range(self.observation_size)), tuple(range(len(self.actuator_names)))
+            return (Part("body", *everything, position=(0.0, 0.0)),)
+        angles = np.arange(len(self.part_entries)) * math.tau / len(self.part_entries)
+        places = np.round([np.cos(angles), np.sin(angles)], 12).T.tolist()
+        return tuple(
+            Part(name, tuple(own["sensors"]), tuple(own["actuators"]), (x, y))
+            for (name, own), (x, y) in zip(self.part_entries.items(), places, strict=True)
+        )
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers in an observation."""
+        return self._interface.observation_size
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """``action_0``, ``action_1``, ...: numbers of a Box, or actions to choose from."""
+        return tuple(f"action_{k}" for k in range(self._interface.actions))
+
+    @property
+    def longest_episode(self) -> int:
+        """`max_steps`, or the environment's own limit."""
+        return self.max_steps or self._interface.max_steps or 1
+
+    @property
+    def tie_noise(self) -> float:  # type: ignore[override]
+        """As in the grid worlds where one of several actions is chosen, else 0."""
+        return 1e-3 if self._interface.is_discrete else 0.0
+
+    @property
+    def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """-1 and 1 for a Box; 0 and 1, so that random values choose all actions equally often."""
+        ones = np.ones(self._interface.actions)
+        return (np.zeros_like(ones) if self._interface.is_discrete else -ones), ones
+
+    @property
+    def resting_action(self) -> NDArray[np.float64]:
+        """Values as near to 0 as a Box allows; the first of several actions, whatever it does."""
+        interface = self._interface
+        if interface.is_discrete:
+            return np.asarray(np.eye(interface.actions)[0])
+        low, high = interface.low, interface.high
+        span = np.where(high > low, high - low, 1.0)
+        return np.asarray(2.0 * (np.clip(0.0, low, high) - low) / span - 1.0)
+
+    def open(self, *, training: bool) -> Simulation:
+        """Make the environment; `training` changes nothing."""
+        world = _World(make(self.env_id, self.kwargs, self.max_steps), self._interface, self.env_id)
+        return Simulation(world, _reset, _rewind, _observe, _step, compiled=False)
+
+    @property
+    def _interface(self) -> Interface:
+        return interface_of(self.env_id, json.dumps(self.kwargs))
+
+
+def _checked_kwargs(kwargs: object) -> dict[str, Any]:
+    """The arguments in alphabetical order: the same ones are the same run."""
+    section = check_section("task.kwargs", kwargs)
+    try:
+        json.dumps(section, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        fix = "texts, finite numbers, true, false, null, lists and sections"
+        raise ConfigError("task.kwargs", "plain data", kwargs, fix) from error
+    for key in section:
+        if not isinstance(key, str) or not key.isidentifier() or key in _OURS:
+            fix = "task.max_steps limits episodes" if key in _OURS else ""
+            raise ConfigError("task.kwargs", "names of the environment's own arguments", key, fix)
+    return dict(sorted(section.items()))
+
+
+def _check_parts(parts: object, sensors: int, actuators: int) -> None:
+    """Refuse parts without sensors or actuators, that overlap, or that name entries which are not there."""
+    taken: dict[tuple[str, int], str] = {}
+    if not check_section("task.parts", parts):
+        raise ConfigError("task.parts", "at least one part, or null", parts)
+    for name, own in check_section("task.parts", parts).items():
+        check_text("task.parts", name, "names of parts")
+        key = f"task.parts.{name}"
+        check_keys(f"{key}.", check_section(key, own), ("sensors", "actuators"))
+        for kind, count in (("sensors", sensors), ("actuators", actuators)):
+            entries = own.get(kind)
+            if not isinstance(entries, list | tuple) or not entries:
+                raise ConfigError(f"{key}.{kind}", "a list of whole numbers, at least one", entries)
+            for entry in entries:
+                check_whole(f"{key}.{kind}", entry, 0, count - 1)
+                if (kind, entry) in taken:
+                    fix = f"task.parts.{taken[kind, entry]}.{kind} has {entry} already"
+                    raise ConfigError(f"{key}.{kind}", "entries that no part has twice", list(entries), fix)
+                taken[kind, entry] = name
+
+
+class _World:
+    """An environment, the seed of its episode, its last observation, (S,), and how many warnings MuJoCo has given."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any], interface: Interface, env_id: str) -> None:
+        self.env, self.interface, self.env_id = env, interface, env_id
+        self.seed, self.observation = 0, np.zeros(interface.observation_size)
+        data = getattr(env.unwrapped, "data", None)
+        self.data = data if isinstance(data, mujoco.MjData) else None
+        self.warnings = 0
+
+    def see(self, observation: Any) -> None:
+        """Take in what the environment shows."""
+        seen = np.asarray(observation, dtype=np.float64).ravel()
+        if seen.shape != self.observation.shape:
+            sizes = f"expected observations of {self.observation.size} numbers, got {seen.size}"
+            raise ExneatError(f"task.env_id={self.env_id}: {sizes}")
+        self.observation = seen
+
+    def new_warnings(self) -> bool:
+        """Whether MuJoCo has given some since the last call: it resets a body that explodes, and goes on paying."""
+        if self.data is None:
+            return False
+        before, self.warnings = self.warnings, int(self.data.warning.number.sum())
+        return self.warnings != before
+
+    def fault(self, function: str, error: Exception) -> ExneatError:
+        """That the environment itself is broken."""
+        return ExneatError(f"task.env_id={self.env_id}: its {function}() raised {in_words(error)}")
+
+
+def _reset(world: _World, rng: Generator) -> None:
+    world.seed = int(rng.integers(2**31))
+    _rewind(world)
+
+
+def _rewind(world: _World) -> None:
+    try:
+        observation, _ = world.env.reset(seed=world.seed)
+    except Exception as error:  # of any code
+        raise world.fault("reset", error) from error
+    world.see(observation)
+    world.new_warnings()
+
+
+def _observe(world: _World, readings: NDArray[np.float64]) -> None:
+    readings[:] = world.observation
+
+
+def _step(world: _World, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
+    terms[0] = 0.0
+    if not np.isfinite(action).all() or not np.isfinite(world.observation).all():
+        return FAILED
+    try:
+        observation, reward, terminated, truncated, _ = world.env.step(world.interface.taken(action))
+    except _ABOUT_THE_ACTION:
+        return FAILED
+    except Exception as error:  # of any code
+        raise world.fault("step", error) from error
+    world.see(observation)
+    terms[0] = reward
+    if world.new_warnings() or not np.isfinite(terms[0]) or not np.isfinite(world.observation).all():
+        return FAILED
+    return ENDED if terminated or truncated else RUNNING

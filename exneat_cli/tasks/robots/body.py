@@ -1,0 +1,262 @@
+"""The trunk and the parts of a MuJoCo body, which parts are alike, and the frame in which each of them senses.
+
+Two parts are alike if one becomes the other by a shift along the trunk, by a turn about the trunk's vertical axis
+where three or more such parts stand evenly around it, or by mirroring left and right. Parts that are alike may share
+a network: Valsalam and Miikkulainen, "Evolving symmetry for modular system design", 2011, found that symmetric legs
+are learned faster on flat ground; Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from exneat_cli.errors import ConfigError
+from exneat_cli.tasks.robots.likeness import MIRROR, Pose, Relation, relate
+
+SYMMETRIES = ("turn", "mirror")
+_JOINT_ACTUATORS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+class Limb(NamedTuple):
+    """A part of a body.
+
+    Attributes:
+        name: of its first body in the model, or of where it stands.
+        likeness: number of the class of alike parts that it belongs to.
+        relation: what maps the first part of its class to it; also lists its bodies, joints and actuators.
+        position: (x, y, z) of its first joint from the trunk, x ahead, y to the left, z up, in metres.
+    """
+
+    name: str
+    likeness: int
+    relation: Relation
+    position: tuple[float, float, float]
+
+
+class Body(NamedTuple):
+    """A robot, taken apart.
+
+    Attributes:
+        trunk: the body that carries the root joints.
+        root: the root joints: a free one, or the slides and the hinge of a planar body.
+        core: bodies of the trunk, with all that belong to no part.
+        limbs: the parts in the order that was asked for.
+        symmetries: those of `SYMMETRIES` that relate some of its parts.
+    """
+
+    trunk: int
+    root: tuple[int, ...]
+    core: tuple[int, ...]
+    limbs: tuple[Limb, ...]
+    symmetries: tuple[str, ...]
+
+
+def take_apart(
+    model: mujoco.MjModel,
+    *,
+    order: str = "position",
+    symmetry: str | None = None,
+    parts: Mapping[str, Sequence[str]] | None = None,
+    by_place: bool = False,
+) -> Body:
+    """Find the trunk and the parts of a robot.
+
+    Args:
+        model: of the robot.
+        order: ``position``: from front to back, left before right; ``model``: as the model numbers their bodies.
+        symmetry: ``turn`` or ``mirror``, what relates parts that no shift relates; None takes mirrorings where there
+            are any.
+        parts: names of each part's bodies, each of which brings along all that hangs on it; None finds the parts.
+        by_place: call parts by where they stand, though their first bodies have names of their own.
+
+    Raises:
+        ConfigError: the model has no root, no actuators or ones of another kind than joints', or `parts` do not fit it.
+    """
+    trunk, root = find_root(model)
+    pose = Pose(model, trunk)
+    named = (
+        _named_parts(model, trunk, parts) if parts else {tuple(subtree(model, b)): "" for b in _outermost(pose, trunk)}
+    )
+    bodies = sorted(named, key=lambda part: _from_front_to_back(pose, part) if order == "position" else part)
+    names = [named[part] or ("" if by_place else model.body(part[0]).name) for part in bodies]
+    names = _unique_names(names, pose, bodies)
+    turns = {(a, b): r for a in bodies for b in bodies if (r := _turn(pose, a, b, bodies))}
+    mirrorings = {(a, b): r for a in bodies for b in bodies if a != b and (r := relate(pose, "mirror", MIRROR, a, b))}
+    moves = turns if symmetry == "turn" or not mirrorings else {}
+    limbs: list[Limb] = []
+    references: list[tuple[int, ...]] = []
+    for name, part in zip(names, bodies, strict=True):
+        x, y, z = (float(each) for each in pose.place(part))
+        ways = [
+            relate(pose, "shift", np.eye(3), first, part) or moves.get((first, part)) or mirrorings.get((first, part))
+            for first in references
+        ]
+        likeness = next((k for k, relation in enumerate(ways) if relation), len(references))
+        if likeness == len(references):
+            references.append(part)
+        limbs.append(Limb(name, likeness, [*ways, None][likeness] or _itself(pose, part), (x, y, z)))
+    in_parts = {body for part in bodies for body in part}
+    core = tuple(body for body in subtree(model, trunk) if body not in in_parts)
+    there = tuple(name for name, found in zip(SYMMETRIES, (turns, mirrorings), strict=True) if found)
+    return Body(trunk, root, core, tuple(limbs), there)
+
+
+def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
+    """The body that the whole robot hangs on, and its root joints; the most driven one where several could be it.
+
+    Raises:
+        ConfigError: no body moves freely or in a plane, or an actuator drives something else than a joint.
+    """
+    if not model.nu:
+        raise ConfigError("task.model", "a model with actuators", "none", "add motors in its <actuator> section")
+    for actuator in range(model.nu):
+        if model.actuator_trntype[actuator] not in _JOINT_ACTUATORS:
+            kind = mujoco.mjtTrn(model.actuator_trntype[actuator]).name.removeprefix("mjTRN_").lower()
+            raise ConfigError(
+                "task.model", "actuators that drive joints", f"{_label(model, actuator)}, which drives a {kind}"
+            )
+    driven = set(model.actuator_trnid[:, 0].tolist())
+    found = []
+    for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
+        joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and j not in driven]
+        if _is_free(model, joints) or _is_planar(model, body, joints):
+            bodies = subtree(model, body)
+            found.append((sum(model.jnt_bodyid[j] in bodies for j in driven), body, tuple(joints)))
+    if not found or max(found)[0] == 0:
+        fix = "give its trunk a <freejoint/>; or two slides along the world's axes and then a hinge at its origin"
+        raise ConfigError("task.model", "a body that moves freely or in a plane and has actuators", "none", fix)
+    _, trunk, root = max(found, key=lambda each: each[0])
+    return trunk, root
+
+
+def _is_free(model: mujoco.MjModel, joints: Sequence[int]) -> bool:
+    return [int(model.jnt_type[j]) for j in joints] == [int(mujoco.mjtJoint.mjJNT_FREE)]
+
+
+def _is_planar(model: mujoco.MjModel, body: int, joints: Sequence[int]) -> bool:
+    """Whether they are two slides and a hinge that MuJoCo measures in the world's axes and from an upright trunk."""
+    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    if [int(model.jnt_type[j]) for j in joints] != [slide, slide, hinge]:
+        return False
+    about = joints[2]
+    axes = model.jnt_axis[list(joints)]
+    in_line = np.all(np.isclose(np.abs(axes).max(axis=1), 1.0)) and np.all(axes[:2].sum(axis=1) > 0.0)
+    upright = np.allclose(model.body_quat[body], [1.0, 0.0, 0.0, 0.0]) and model.qpos0[model.jnt_qposadr[about]] == 0.0
+    return bool(in_line and upright and np.allclose(model.jnt_pos[about], 0.0))
+
+
+def subtree(model: mujoco.MjModel, root: int) -> list[int]:
+    """A body and all that hang on it, parents before children."""
+    bodies = [root]
+    for body in range(root + 1, model.nbody):  # a model numbers children after their parents
+        if model.body_parentid[body] in bodies:
+            bodies.append(body)
+    return bodies
+
+
+def _outermost(pose: Pose, trunk: int) -> list[int]:
+    """The first bodies of the parts: the trunk goes on while two or more driven subtrees hang on its middle plane."""
+    model = pose.model
+    driven = {int(model.jnt_bodyid[joint]) for joint in model.actuator_trnid[:, 0]}
+
+    def limbs_on(body: int) -> list[int]:
+        children = np.flatnonzero(model.body_parentid == body).tolist()
+        return [child for child in children if driven & set(subtree(model, child))]
+
+    def is_trunk(body: int) -> bool:
+        if abs(pose.bodies[body][1]) > pose.tolerance:
+            return False
+        branches = limbs_on(body)
+        return len(branches) > 1 or any(is_trunk(branch) for branch in branches)
+
+    outermost, waiting = [], limbs_on(trunk)
+    while waiting:
+        body = waiting.pop()
+        if is_trunk(body):
+            waiting += limbs_on(body)
+        else:
+            outermost.append(body)
+    return outermost
+
+
+def _named_parts(model: mujoco.MjModel, trunk: int, parts: Mapping[str, Sequence[str]]) -> dict[tuple[int, ...], str]:
+    known = {model.body(body).name: body for body in subtree(model, trunk)[1:]}
+    named: dict[tuple[int, ...], str] = {}
+    taken: dict[int, str] = {}
+    for name, roots in parts.items():
+        if not roots:
+            raise ConfigError(f"task.parts.{name}", "the names of one or more bodies", "none")
+        bodies: list[int] = []
+        for root in roots:
+            if root not in known:
+                raise ConfigError(f"task.parts.{name}", f"bodies of the model: {', '.join(known)}", root)
+            bodies += [body for body in subtree(model, known[root]) if body not in bodies]
+        for body in bodies:
+            if body in taken:
+                both = f"{model.body(body).name} in {taken[body]} and {name}"
+                raise ConfigError(
+                    "task.parts", "parts that do not overlap", both, "a body brings along all that hangs on it"
+                )
+            taken[body] = name
+        named[tuple(bodies)] = name
+    return named
+
+
+def _from_front_to_back(pose: Pose, part: Sequence[int]) -> tuple[float, ...]:
+    x, y, z = (round(float(each / pose.tolerance)) for each in pose.place(part))
+    return (-x, -y, -z, part[0])
+
+
+def _unique_names(names: list[str], pose: Pose, parts: Sequence[Sequence[int]]) -> list[str]:
+    """The names, if all are there and differ; else words for where the parts stand, numbered where they repeat."""
+    if all(names) and len(set(names)) == len(names):
+        return names
+    words = [place_in_words(pose, part) for part in parts]
+    return [word if words.count(word) == 1 else f"{word}_{words[:k].count(word) + 1}" for k, word in enumerate(words)]
+
+
+def place_in_words(pose: Pose, part: Sequence[int]) -> str:
+    """Where a part stands, e.g. ``front_left``; ``middle`` below the trunk's origin."""
+    x, y, _ = pose.place(part)
+    ahead = "front" if x > pose.tolerance else "back" if x < -pose.tolerance else ""
+    aside = "left" if y > pose.tolerance else "right" if y < -pose.tolerance else ""
+    return "_".join(filter(None, (ahead, aside))) or "middle"
+
+
+def _turn(
+    pose: Pose, one: tuple[int, ...], other: tuple[int, ...], parts: Sequence[tuple[int, ...]]
+) -> Relation | None:
+    """What turns a part into another, if they and all others that a turn makes of it stand evenly around the trunk."""
+    related = {part: r for part in parts if (r := _turned(pose, one, part))}
+    if len(related) < 3 or one == other or other not in related:
+        return None
+    angles = np.sort([_angle(pose, part) for part in related])
+    steps = np.diff(angles, append=angles[0] + 2.0 * math.pi)
+    return related[other] if np.ptp(steps) < 1e-3 else None
+
+
+def _turned(pose: Pose, one: Sequence[int], other: Sequence[int]) -> Relation | None:
+    angle = _angle(pose, other) - _angle(pose, one)
+    sine, cosine = math.sin(angle), math.cos(angle)
+    return relate(pose, "turn", np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]), one, other)
+
+
+def _angle(pose: Pose, part: Sequence[int]) -> float:
+    x, y, _ = pose.place(part)
+    return math.atan2(y, x)
+
+
+def _itself(pose: Pose, part: Sequence[int]) -> Relation:
+    joints = tuple(joint for body in part for joint in pose.joints_of(body))
+    actuators = tuple(actuator for joint in joints for actuator in pose.actuators_of(joint))
+    ones = (1,) * len(joints), (1,) * len(actuators)
+    return Relation("itself", np.eye(3), tuple(part), joints, ones[0], actuators, ones[1])
+
+
+def _label(model: mujoco.MjModel, actuator: int) -> str:
+    return model.actuator(actuator).name or f"actuator {actuator}"

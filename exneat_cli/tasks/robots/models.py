@@ -1,0 +1,196 @@
+"""Where a robot's model comes from, and the rules of its episodes: names for Gymnasium's and our own, or a file.
+
+Rules of names are those of Gymnasium's v5 environments (Farama Foundation, 2024).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import mujoco
+
+from exneat_cli.errors import ConfigError
+
+LARGEST = 64 * 2**20
+"""Bytes that a model and the files it includes may have together."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What an episode of a robot is like.
+
+    Attributes:
+        control_period: seconds per control step.
+        heights: healthy range of the trunk's height in m, None for 0.4 to 2 times the initial one.
+        steepest: healthy size of a planar trunk's angle in rad.
+        largest: healthy size of velocities, and of positions from the third on.
+        speed: whose speed counts: of the ``trunk``, of its first joint (``slide``) or of the ``mass``.
+        reset_scale: noise on the initial pose.
+        normal: whether it is normal on velocities, else uniform as on positions.
+        forward_weight, healthy_reward, control_weight, contact_weight: of the full reward.
+        cost_limit: contact forces (N, N m) are clipped to this in the contact cost.
+        largest_contact_cost: what the contact cost of a step is cut to.
+        named_by_place: whether parts are called by where they stand, because their bodies' names mislead.
+    """
+
+    control_period: float = 0.05
+    heights: tuple[float, float] | None = None
+    steepest: float = float("inf")
+    largest: float = float("inf")
+    speed: str = "trunk"
+    reset_scale: float = 0.1
+    normal: bool = True
+    forward_weight: float = 1.0
+    healthy_reward: float = 1.0
+    control_weight: float = 0.5
+    contact_weight: float = 5e-4
+    cost_limit: float = 1.0
+    largest_contact_cost: float = float("inf")
+    named_by_place: bool = False
+
+
+_ALWAYS = (float("-inf"), float("inf"))
+_PLANAR = Rules(heights=_ALWAYS, speed="slide", normal=False, contact_weight=0.0)
+
+
+def _planar(**different: object) -> Rules:
+    return dataclasses.replace(_PLANAR, **different)  # type: ignore[arg-type]
+
+
+NAMED: dict[str, tuple[str, Rules]] = {
+    "ant": ("ant.xml", Rules(heights=(0.2, 1.0), named_by_place=True)),
+    "half_cheetah": ("half_cheetah.xml", _planar(normal=True, healthy_reward=0.0, control_weight=0.1)),
+    "hopper": (
+        "hopper.xml",
+        _planar(
+            control_period=0.008,
+            heights=(0.7, float("inf")),
+            steepest=0.2,
+            largest=100.0,
+            reset_scale=5e-3,
+            control_weight=1e-3,
+        ),
+    ),
+    "walker2d": (
+        "walker2d_v5.xml",
+        _planar(control_period=0.008, heights=(0.8, 2.0), steepest=1.0, reset_scale=5e-3, control_weight=1e-3),
+    ),
+    "swimmer": ("swimmer.xml", _planar(control_period=0.04, healthy_reward=0.0, control_weight=1e-4)),
+    "humanoid": (
+        "humanoid.xml",
+        Rules(
+            control_period=0.015,
+            heights=(1.0, 2.0),
+            speed="mass",
+            reset_scale=1e-2,
+            normal=False,
+            forward_weight=1.25,
+            healthy_reward=5.0,
+            control_weight=0.1,
+            contact_weight=5e-7,
+            cost_limit=float("inf"),
+            largest_contact_cost=10.0,
+        ),
+    ),
+    "hexapod": ("hexapod.xml", Rules()),
+}
+"""File and rules of each model that has a name."""
+
+
+def rules_of(model: str) -> Rules:
+    """The rules of a named model; Ant's for a file, with heights that follow from its initial pose."""
+    return NAMED[model][1] if model in NAMED else Rules()
+
+
+def path_of(model: str) -> Path:
+    """The file of a model, by name or path.
+
+    Raises:
+        ConfigError: there is no such file.
+    """
+    if model in NAMED:
+        return _shipped(model)
+    path = Path(model).expanduser()
+    if not path.is_file():
+        fix = f"or one of the names {', '.join(NAMED)}"
+        raise ConfigError("task.model", "an MJCF file that exists", model, fix)
+    return path
+
+
+@functools.cache
+def _shipped(model: str) -> Path:
+    ours = resources.files(__package__)
+    return Path(
+        str((ours if model == "hexapod" else resources.files("gymnasium.envs.mujoco.assets")) / NAMED[model][0])
+    )
+
+
+def _state(model: str) -> tuple[Path, int, int]:
+    """What tells one content of a model's file from another: a program may run for long, and files change."""
+    path = path_of(model).resolve()
+    found = path.stat()
+    return path, found.st_mtime_ns, found.st_size
+
+
+def files_of(model: str) -> dict[str, bytes]:
+    """The model's file and all that it includes, by their paths below the directory that holds them all.
+
+    Raises:
+        ConfigError: one of them is missing, cannot be read, is no MJCF, or they are too large.
+    """
+    return _files(*_state(model))
+
+
+@functools.lru_cache(maxsize=16)
+def _files(main: Path, *_: int) -> dict[str, bytes]:
+    try:
+        _refuse_large([main])
+        paths = [main, *(Path(os.path.normpath(name)) for name in mujoco.mju_getXMLDependencies(str(main)))]
+        _refuse_large(paths)
+        common = Path(os.path.commonpath([path.parent for path in paths]))
+        return {str(path.relative_to(common)): path.read_bytes() for path in sorted(set(paths))}
+    except OSError as error:
+        came = f"{error.filename}: {error.strerror}"
+        raise ConfigError("task.model", "a model whose files can all be read", came) from error
+    except mujoco.FatalError as error:
+        raise ConfigError("task.model", "an MJCF file", f"{main.name}: {error}") from error
+
+
+def _refuse_large(paths: Iterable[Path]) -> None:
+    if sum(path.stat().st_size for path in paths) > LARGEST:
+        raise ConfigError("task.model", f"files of at most {LARGEST >> 20} MB together", "larger ones")
+
+
+def digest_of(model: str) -> str:
+    """SHA-256 of the model's files and their names."""
+    digest = hashlib.sha256()
+    for name, content in files_of(model).items():
+        digest.update(f"{name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def load(model: str) -> mujoco.MjModel:
+    """The compiled model, the same object as long as its file does not change.
+
+    Raises:
+        ConfigError: its files cannot be used, see `files_of`, or MuJoCo refuses them.
+    """
+    return _load(*_state(model))
+
+
+@functools.lru_cache(maxsize=16)
+def _load(path: Path, *state: int) -> mujoco.MjModel:
+    _files(path, *state)
+    mujoco.set_mju_user_warning(lambda message: None)  # else MuJoCo writes MUJOCO_LOG.TXT
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError("task.model", "an MJCF file that MuJoCo can load", f"{path.name}: {reason}") from error

@@ -1,0 +1,75 @@
+"""What a robot's sensors read, entry by entry: positions, velocities and contact forces, with names and units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.tasks.robots.body import Body, subtree
+
+FORCES = (*((f"torque {axis}", "N m") for axis in "xyz"), *((f"force {axis}", "N") for axis in "xyz"))
+"""Entries of MuJoCo's `cfrc_ext` per body, in the world's axes."""
+_FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+class Readings(NamedTuple):
+    """The entries of an observation: positions first, then velocities, then contact forces.
+
+    Attributes:
+        names, units: of all entries.
+        positions: which entries of `qpos` are read, in order: all but the root's place on the ground.
+        velocities: which entries of `qvel`.
+        bodies: whose contact forces, six each; empty where none are sensed.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    positions: NDArray[np.int64]
+    velocities: NDArray[np.int64]
+    bodies: NDArray[np.int64]
+
+    def position(self, address: int) -> int:
+        """Index of the reading of an entry of `qpos`; -1 if it is not read."""
+        found = np.flatnonzero(self.positions == address)
+        return int(found[0]) if found.size else -1
+
+    def velocity(self, address: int) -> int:
+        """Index of the reading of an entry of `qvel`."""
+        return len(self.positions) + int(np.flatnonzero(self.velocities == address)[0])
+
+    def forces(self, bodies: Iterable[int]) -> list[int]:
+        """Indices of the first of the six contact forces of each body; none where they are not sensed."""
+        first = len(self.positions) + len(self.velocities)
+        sensed = self.bodies.tolist()
+        return [first + len(FORCES) * sensed.index(body) for body in bodies if body in sensed]
+
+
+def read_off(model: mujoco.MjModel, body: Body, *, contact_forces: bool) -> Readings:
+    """The entries for a robot: of all joints of its bodies but for the place on the ground, x and y."""
+    bodies = subtree(model, body.trunk)
+    positions: list[tuple[int, str, str]] = []
+    velocities: list[tuple[int, str, str]] = []
+    for joint in (j for j in range(model.njnt) if model.jnt_bodyid[j] in bodies):
+        first, speed, kind = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), int(model.jnt_type[joint])
+        name, length = model.joint(joint).name or f"joint {joint}", "m" if kind == _SLIDE else "rad"
+        if kind == _FREE:
+            turned = [(first + 3 + k, f"trunk orientation {axis}", "-") for k, axis in enumerate("wxyz")]
+            positions += [(first + 2, "trunk height", "m"), *turned]
+            velocities += [(speed + k, f"trunk velocity {axis}", "m/s") for k, axis in enumerate("xyz")]
+            velocities += [(speed + 3 + k, f"trunk angular velocity {axis}", "rad/s") for k, axis in enumerate("xyz")]
+        elif kind == int(mujoco.mjtJoint.mjJNT_BALL):
+            positions += [(first + k, f"{name} orientation {axis}", "-") for k, axis in enumerate("wxyz")]
+            velocities += [(speed + k, f"{name} angular velocity {axis}", "rad/s") for k, axis in enumerate("xyz")]
+        else:
+            if joint not in body.root or kind != _SLIDE or abs(model.jnt_axis[joint][2]) > 0.5:
+                positions.append((first, f"{name} position", length))
+            velocities.append((speed, f"{name} velocity", f"{length}/s"))
+    forced = bodies if contact_forces else []
+    forces = [(0, f"{model.body(b).name or f'body {b}'} contact {what}", unit) for b in forced for what, unit in FORCES]
+    _, names, units = zip(*positions, *velocities, *forces, strict=True)
+    indices = [np.array(each, np.int64) for each in ([p[0] for p in positions], [v[0] for v in velocities], forced)]
+    return Readings(names, units, *indices)

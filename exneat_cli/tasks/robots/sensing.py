@@ -1,0 +1,255 @@
+"""Which entries of what is sensed belong to which part of a robot, in the world's axes or in the parts' own frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.tasks.robots.body import Body, Limb
+from exneat_cli.tasks.robots.frames import VIEW, Frames
+from exneat_cli.tasks.robots.likeness import MIRROR, Pose, relate
+from exneat_cli.tasks.robots.readings import FORCES, Readings
+from exneat_cli.tasks.task import Part
+
+
+class Sensing(NamedTuple):
+    """What is sensed, and by whom.
+
+    Attributes:
+        names, units: of all entries.
+        parts: in the body's order.
+        trunk: the trunk's own entries, and the actuators of its own joints.
+        frames: how readings become entries, where they are not the entries.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    parts: tuple[Part, ...]
+    trunk: Part
+    frames: Frames
+
+
+def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensing:
+    """Every part senses its readings as they are."""
+
+    def entries(joints: Iterable[int], bodies: Iterable[int]) -> tuple[list[int], list[int]]:
+        moved = [_entries_of_joint(model, readings, joint) for joint in joints]
+        positions, velocities = ([entry for each in moved for entry in each[kind]] for kind in (0, 1))
+        forces = [first + k for first in readings.forces(bodies) for k in range(len(FORCES))]
+        return positions + velocities, forces
+
+    core, core_forces = entries(_joints_of_core(model, body), body.core)
+    trunk = Part("trunk", tuple(sorted(core)) + tuple(core_forces), _actuators_of_core(model, body), (0.0, 0.0))
+    parts = []
+    for limb in body.limbs:
+        joints, forces = entries(limb.relation.joints, limb.relation.bodies)
+        part = _part(limb, (*joints, *forces), joints, joints, trunk.sensors)
+        parts.append(replace(part, is_mirrored=False))
+    nothing = np.full((1, len(VIEW)), -1, np.int64)
+    frames = _frames(model, body, readings, _Layout(model, readings), np.eye(3)[None], nothing)
+    return Sensing(readings.names, readings.units, tuple(parts), trunk, frames)
+
+
+class _Layout:
+    """The entries so far, and where each of them comes from."""
+
+    def __init__(self, model: mujoco.MjModel, readings: Readings) -> None:
+        self.model, self.readings = model, readings
+        self.names: list[str] = []
+        self.units: list[str] = []
+        self.scalars: list[tuple[int, int, int]] = []
+        self.vectors: list[tuple[int, int, int, bool]] = []
+
+    def add(self, name: str, unit: str) -> int:
+        self.names.append(name)
+        self.units.append(unit)
+        return len(self.names) - 1
+
+    def add_joints(self, joints: Sequence[int], signs: Sequence[int], suffix: str = "") -> list[int]:
+        """Positions of all joints, then their velocities."""
+        found = []
+        for kind in (0, 1):
+            for joint, sign in zip(joints, signs, strict=True):
+                for entry in _entries_of_joint(self.model, self.readings, joint)[kind]:
+                    found.append(self.add(self.readings.names[entry] + suffix, self.readings.units[entry]))
+                    self.scalars.append((entry, found[-1], sign))
+        return found
+
+    def add_forces(self, bodies: Iterable[int], frame: int, suffix: str) -> list[int]:
+        """Torque and force on each body, turned into a frame."""
+        found = []
+        for first in self.readings.forces(bodies):
+            for offset in (0, 3):
+                entries = range(first + offset, first + offset + 3)
+                added = [self.add(self.readings.names[entry] + suffix, self.readings.units[entry]) for entry in entries]
+                self.vectors.append((entries[0], added[0], frame, offset == 0))
+                found += added
+        return found
+
+
+def in_own_frames(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensing:
+    """Every part senses its joints with their signs, and its contact forces and the trunk in its own frame."""
+    pose, layout = Pose(model, body.trunk), _Layout(model, readings)
+    moves: list[NDArray[np.float64]] = [np.eye(3)]
+    frame_of = []
+    for limb in body.limbs:
+        known = [f for f, move in enumerate(moves) if np.allclose(move, limb.relation.move)]
+        if not known:
+            moves.append(limb.relation.move)
+        frame_of.append(known[0] if known else len(moves) - 1)
+    own = []
+    for limb, frame in zip(body.limbs, frame_of, strict=True):
+        joints = layout.add_joints(limb.relation.joints, limb.relation.joint_signs)
+        own.append((joints, layout.add_forces(limb.relation.bodies, frame, f" in the frame of {limb.name}")))
+    any_mirrored = any(np.linalg.det(move) < 0.0 for move in moves)
+    seen_mirrored = [
+        _mirrored_joints(pose, layout, limb, joints) if any_mirrored else joints
+        for limb, (joints, _) in zip(body.limbs, own, strict=True)
+    ]
+    views = np.full((len(moves), len(VIEW)), -1, np.int64)
+    trunk_blocks = []
+    for frame, move in enumerate(moves):
+        suffix = "" if frame == 0 else f" as seen from frame {frame}"
+        first = len(layout.names)
+        for k in _varying(model, body):
+            views[frame, k] = layout.add(f"trunk {VIEW[k][0]}{suffix}", VIEW[k][1])
+        core = [joint for joint in _joints_of_core(model, body) if joint not in body.root]
+        layout.add_joints(core, [_sign_under(pose, move, joint) for joint in core], suffix)
+        layout.add_forces(body.core, frame, suffix)
+        trunk_blocks.append(tuple(range(first, len(layout.names))))
+    parts = tuple(
+        _part(limb, (*joints, *forces), joints, mirrored, trunk_blocks[frame])
+        for limb, frame, (joints, forces), mirrored in zip(body.limbs, frame_of, own, seen_mirrored, strict=True)
+    )
+    trunk = Part("trunk", trunk_blocks[0], _actuators_of_core(model, body), (0.0, 0.0))
+    frames = _frames(model, body, readings, layout, np.array(moves), views)
+    return Sensing(tuple(layout.names), tuple(layout.units), parts, trunk, frames)
+
+
+def _frames(
+    model: mujoco.MjModel,
+    body: Body,
+    readings: Readings,
+    layout: _Layout,
+    moves: NDArray[np.float64],
+    views: NDArray[np.int64],
+) -> Frames:
+    pose, signs = Pose(model, body.trunk), np.ones(model.nu)
+    for limb in body.limbs:
+        signs[list(limb.relation.actuators)] = limb.relation.actuator_signs
+    free = len(body.root) == 1
+    if free:
+        (root,) = body.root
+        speed = int(model.jnt_dofadr[root])
+        velocities, axes, about = [readings.velocity(speed + k) for k in range(3)], np.eye(3), np.zeros(3)
+        height = readings.position(int(model.jnt_qposadr[root]) + 2)
+        orientation, spin, above = height + 1, readings.velocity(speed + 3), 0.0
+    else:
+        hinge = next(j for j in body.root if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE)
+        slides = tuple(j for j in body.root if j != hinge)
+        about, axes = pose.axes[hinge], pose.axes[list(slides)]
+        velocities = [readings.velocity(int(model.jnt_dofadr[j])) for j in slides]
+        rising = [j for j in slides if abs(pose.axes[j][2]) > 0.5]
+        address = int(model.jnt_qposadr[rising[0]]) if rising else -1
+        height = readings.position(address) if rising else -1
+        above = float(pose.height - model.qpos0[address]) if rising else 0.0
+        orientation = readings.position(int(model.jnt_qposadr[hinge]))
+        spin = readings.velocity(int(model.jnt_dofadr[hinge]))
+    scalars = np.array(layout.scalars, np.int64).reshape(-1, 3)
+    vectors = np.array(layout.vectors, np.int64).reshape(-1, 4)
+    return Frames(
+        height=height,
+        above=above,
+        orientation=orientation,
+        free=free,
+        hinge=np.array(about, np.float64),
+        velocities=np.array(velocities, np.int64),
+        axes=np.array(axes, np.float64),
+        spin=spin,
+        moves=moves,
+        views=views,
+        scalar_from=scalars[:, 0].copy(),
+        scalar_to=scalars[:, 1].copy(),
+        scalar_sign=scalars[:, 2].astype(np.float64),
+        vector_from=vectors[:, 0].copy(),
+        vector_to=vectors[:, 1].copy(),
+        vector_frame=vectors[:, 2].copy(),
+        vector_is_pseudo=vectors[:, 3].astype(np.bool_),
+        action_signs=signs,
+    )
+
+
+def _varying(model: mujoco.MjModel, body: Body) -> list[int]:
+    """Which numbers of a view vary: in a plane, only what lies in it, and turns about its normal."""
+    if len(body.root) == 1:
+        return list(range(len(VIEW)))
+    axes = {int(model.jnt_type[j]): np.abs(model.jnt_axis[j]) > 0.5 for j in body.root}
+    normal = axes[int(mujoco.mjtJoint.mjJNT_HINGE)]
+    upright = not normal[2]
+    return [
+        *([0] if upright else []),
+        *(1 + k for k in range(3) if upright and not normal[k]),
+        *(4 + k for k in range(3) if not normal[k]),
+        *(7 + k for k in range(3) if not normal[k]),
+        *(10 + k for k in range(3) if normal[k]),
+    ]
+
+
+def _mirrored_joints(pose: Pose, layout: _Layout, limb: Limb, joints: list[int]) -> list[int]:
+    """The entries that a mirrored part reads of this one's joints: of a limb on the middle plane with other signs."""
+    bodies = limb.relation.bodies
+    image = relate(pose, "mirror", MIRROR, bodies, bodies)
+    if image is None:
+        return joints
+    signs = [own * sign for own, sign in zip(limb.relation.joint_signs, image.joint_signs, strict=True)]
+    if image.joints == limb.relation.joints and signs == list(limb.relation.joint_signs):
+        return joints
+    return layout.add_joints(image.joints, signs, " as a mirrored part sees it")
+
+
+def _sign_under(pose: Pose, move: NDArray[np.float64], joint: int) -> int:
+    """-1 if a move reverses the axis of a joint of the trunk, 1 if it keeps it or makes another axis of it."""
+    axis, kind = pose.axes[joint], int(pose.model.jnt_type[joint])
+    handedness = np.linalg.det(move) if kind != int(mujoco.mjtJoint.mjJNT_SLIDE) else 1.0
+    return -1 if float(move @ axis @ axis) * handedness < -0.999 else 1
+
+
+def _entries_of_joint(model: mujoco.MjModel, readings: Readings, joint: int) -> tuple[list[int], list[int]]:
+    """Indices of the readings of a joint's positions, as far as they are read, and velocities."""
+    widths = {int(mujoco.mjtJoint.mjJNT_FREE): (7, 6), int(mujoco.mjtJoint.mjJNT_BALL): (4, 3)}
+    positions, velocities = widths.get(int(model.jnt_type[joint]), (1, 1))
+    first, speed = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    read = [readings.position(first + k) for k in range(positions)]
+    return [entry for entry in read if entry >= 0], [readings.velocity(speed + k) for k in range(velocities)]
+
+
+def _joints_of_core(model: mujoco.MjModel, body: Body) -> list[int]:
+    return [joint for joint in range(model.njnt) if model.jnt_bodyid[joint] in body.core]
+
+
+def _actuators_of_core(model: mujoco.MjModel, body: Body) -> tuple[int, ...]:
+    core = _joints_of_core(model, body)
+    return tuple(a for a in range(model.nu) if model.actuator_trnid[a, 0] in core)
+
+
+def _part(
+    limb: Limb, sensors: Sequence[int], joints: Sequence[int], mirrored: Sequence[int], trunk: Sequence[int]
+) -> Part:
+    x, y, z = limb.position
+    return Part(
+        limb.name,
+        tuple(sensors),
+        limb.relation.actuators,
+        (x, y),
+        height=z,
+        likeness=limb.likeness,
+        is_mirrored=limb.relation.name == "mirror",
+        joints=tuple(joints),
+        mirrored_joints=tuple(mirrored),
+        trunk=tuple(trunk),
+    )

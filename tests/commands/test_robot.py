@@ -1,0 +1,103 @@
+"""Robots from the command line: a model file of one's own, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from exneat_cli.main import main
+from tests.commands.refusals import check_refusal
+
+LEG = """
+      <body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" range="-40 40"/>
+        <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.3"/></body>"""
+ROBOT = """<mujoco><compiler angle="degree" autolimits="true"/><option timestep="0.01"/>
+  <worldbody><geom type="plane" size="10 10 1"/>
+    <body name="trunk" pos="0 0 0.35">{root}<geom type="box" size="0.3 0.15 0.05"/>{legs}
+    </body></worldbody>
+  <actuator>{motors}</actuator></mujoco>"""
+LEGS = {"fl": (0.3, 0.15), "fr": (0.3, -0.15), "bl": (-0.3, 0.15), "br": (-0.3, -0.15)}
+MOTORS = "".join(f'<motor joint="{name}_hip" ctrlrange="-1 1" gear="5"/>' for name in LEGS)
+SOUND = ROBOT.format(
+    root="<freejoint/>", legs="".join(LEG.format(name=n, x=x, y=y) for n, (x, y) in LEGS.items()), motors=MOTORS
+)
+COMMON = ["task=robot", "budget=smoke", "executor=serial", "population=4", "task.max_steps=40"]
+
+
+def write(path: Path, text: str = SOUND) -> str:
+    path.write_text(text)
+    return f"task.model={path}"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (None, "expected an MJCF file that exists, got 'robot.xml'"),
+        ("not XML", "expected an MJCF file, got"),
+        (SOUND.replace(MOTORS, ""), "expected a model with actuators"),
+        (SOUND.replace("<freejoint/>", ""), "expected a body that moves freely or in a plane"),
+        (SOUND.replace('type="box"', 'type="no"'), "expected an MJCF file that MuJoCo can load"),
+        (SOUND.replace("<worldbody>", '<asset><mesh file="gone.stl"/></asset><worldbody>'), "gone.stl: No such file"),
+        (SOUND + " " * 2**26, "expected files of at most 64 MB together"),
+    ],
+)
+def test_a_model_that_cannot_be_used_is_refused_before_anything_is_made(
+    text: str | None, named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        write(tmp_path / "robot.xml", text)
+    check_refusal(["train", *COMMON, "task.model=robot.xml"], ["task.model", named], tmp_path, capfd)
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ("task.model=hexapod linkage=feedback wiring.central=false", "linkage"),
+        ("task.model=humanoid wiring.central=false", "wiring.trunk: expected module, for nobody else drives abdomen_y"),
+        ("task.model=ant wiring.trunk=module", "wiring.trunk: expected none or shared"),
+        ("task.model=ant wiring.trunk=shared wiring.central=true", "wiring.trunk"),
+        ("task.model=walker2d geometry=fb", "geometry: expected parts that all stand in front or behind"),
+        ("task.model=hexapod task.control_period=0.013", "task.control_period: expected a multiple"),
+        ("task=hunting wiring.trunk=shared", "wiring.trunk: expected none"),
+        ("task=hunting geometry=auto", "geometry: expected single, all or custom"),
+    ],
+)
+def test_what_does_not_fit_a_body_is_refused(
+    settings: str, named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    common = ["budget=smoke"] if "task=hunting" in settings else COMMON
+    check_refusal(["train", *common, *settings.split()], [named], tmp_path, capfd)
+
+
+def test_a_model_of_ones_own_is_kept_with_its_run_and_may_not_change_in_between(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = write(tmp_path / "dog.xml")
+    train = ["train", *COMMON, model, "geometry=auto", "linkage=joints", "wiring.trunk=shared"]
+    assert main(train) == 0
+    assert "fl 0, fr 0, bl 0, br 0" in capsys.readouterr().err
+    (run,) = (tmp_path / "outputs" / "robot").iterdir()
+    assert (run / "model" / "dog.xml").read_text() == SOUND
+    write(tmp_path / "dog.xml", SOUND.replace('gear="5"', 'gear="6"'))
+    assert main([*train, "resume=true", "generations=3"]) == 2
+    assert "began with other files of the task" in capsys.readouterr().err
+    (tmp_path / "dog.xml").unlink()
+    assert main(["evaluate", f"run={run}", "sweep=reset_noise", "sweep.levels=[0.0]", "sweep.episodes=1"]) == 0
+    assert (run / "robustness.csv").exists()
+
+
+def test_inspect_shows_parts_and_geometries_before_any_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["inspect", "task=robot", write(tmp_path / "dog.xml")]) == 0
+    shown = capsys.readouterr().out
+    assert "class    0: a mirror of fl" in shown
+    assert "fl_hip position (rad)" in shown
+    assert "auto      0 0 0 0" in shown
+    assert "fb        0 0 1 1" in shown
+    assert list(tmp_path.iterdir()) == [tmp_path / "dog.xml"]
