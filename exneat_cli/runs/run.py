@@ -86,9 +86,8 @@ def train(
 
 def _refuse_changed_files(settings: RunSettings, asked: Mapping[str, Any]) -> None:
     """Refuse to begin anew what was to be resumed, because a file that the task is made of has changed since."""
-    directory = settings.directory.path
-    name = f"{settings.variant}-s{settings.seed}-"
-    for path in sorted(directory.parent.glob(f"{name}*")) if settings.task.files() else ():
+    siblings = settings.directory.path.parent.glob(f"{settings.variant}-s{settings.seed}-*")
+    for path in sorted(siblings) if settings.task.files() else ():
         if RunDirectory(path).is_alike(asked):
             fix = f"use the copy in {path / 'model'}, or leave resume=true out for a new run"
             raise ExneatError(f"{path}: began with other files of the task than there are now\n  {fix}")

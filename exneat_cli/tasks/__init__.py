@@ -9,7 +9,8 @@ from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
 from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
 from exneat_cli.tasks.grid.world import GridTask
 from exneat_cli.tasks.gym import GymTask
-from exneat_cli.tasks.robots.robot import AntTask, RobotTask
+from exneat_cli.tasks.robots.ant import AntTask
+from exneat_cli.tasks.robots.robot import RobotTask
 from exneat_cli.tasks.task import (
     ENDED,
     FAILED,

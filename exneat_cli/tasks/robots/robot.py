@@ -267,10 +267,8 @@ class RobotTask(Task):
 
     @property
     def _substeps(self) -> int:
-        period, timestep = (
-            self.control_period or rules_of(self.model).control_period,
-            float(load(self.model).opt.timestep),
-        )
+        period = self.control_period or rules_of(self.model).control_period
+        timestep = float(load(self.model).opt.timestep)
         substeps = max(1, round(period / timestep))
         if abs(substeps * timestep - period) > 1e-9:
             expected = f"a multiple of the model's time step of {timestep:g} s"
@@ -299,24 +297,3 @@ def _anatomy(
     body = take_apart(model, order=order, symmetry=symmetry, parts=dict(named), by_place=by_place)
     readings = read_off(model, body, contact_forces=contact_forces)
     return body, readings, (in_the_world if frame == "world" else in_own_frames)(model, body, readings)
-
-
-@dataclass(frozen=True)
-class AntTask(RobotTask):
-    """Gymnasium's Ant-v5 as the thesis has it; parameters as of any robot.
-
-    By position, x ahead and y to the left, leg 1 is front left, leg 2 back left, leg 3 back right and leg 4 front
-    right, whatever the names of the model's bodies say.
-    """
-
-    name: str = "ant"
-    model: str = "ant"
-    frame: str = "world"
-    contact_forces: bool = True
-    reward: str = "thesis"
-
-    def identity(self) -> dict[str, Any]:
-        """The parameters; those that came later count only where they change Ant as it always was."""
-        later = ("model", "frame", "symmetry", "contact_forces", "parts", "control_period")
-        now, before = self.to_plain(), AntTask().to_plain()
-        return {key: value for key, value in super().identity().items() if key not in later or now[key] != before[key]}
