@@ -127,9 +127,8 @@ def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", experiment_names())
-@pytest.mark.parametrize("budget", ["paper", "quick", "smoke"])
-def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, budget: str, tmp_path: Path) -> None:
-    jobs = plan(tmp_path, name=name, budget=budget)
+def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, tmp_path: Path) -> None:
+    jobs = plan(tmp_path, name=name, budget="paper")  # smaller budgets have the same jobs, with fewer seeds
     assert len({job.settings.directory.path for job in jobs}) == len(jobs) == len({job.name for job in jobs})
 
 
