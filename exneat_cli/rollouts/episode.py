@@ -141,7 +141,9 @@ def _loop_of(simulation: Simulation, task: str) -> Callable[..., Any]:
 
 @functools.cache
 def _compiled_loop(task: str, **functions: Callable[..., Any]) -> Callable[..., Any]:
-    return compiled_lean(with_functions(_episodes, f"episodes_of_{task}", **functions))
+    # Worlds of one task may bind other functions, such as none to sense; the cache tells loops apart by name alone.
+    name = "_".join(("episodes_of", task, *(function.__name__ for function in functions.values())))
+    return compiled_lean(with_functions(_episodes, name, **functions))
 
 
 def open_world(task: Task, noise: Noise, *, training: bool) -> Simulation:

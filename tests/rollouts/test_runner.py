@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from exneat_cli.brains import Brains, motionless
 from exneat_cli.brains.rules import weighted_sums
 from exneat_cli.rollouts import Executor, Noise, Runner, runner
+from exneat_cli.rollouts.episode import _loop_of
 from exneat_cli.rollouts.runner import shares_for_threads, short_shares
 from exneat_cli.seeding import generator, training_episodes
-from exneat_cli.tasks import TrackMaze
+from exneat_cli.tasks import AntTask, TrackMaze
 from tests.rollouts.drifting import COMPILED, EPISODES, PLAIN, SERIAL, Drifting, assert_equal, random_brains, run
 
 EXPLODING = weighted_sums(np.full((1, 3), math.nan), np.zeros(1))
@@ -157,3 +158,8 @@ def test_calls_in_the_main_thread_are_as_long_as_signals_may_wait(
         sizes.append(last - first)
         now[0] += seconds_per_brain * sizes[-1]
     assert max(sizes) == largest
+
+
+def test_worlds_of_one_task_that_sense_differently_never_share_a_cached_loop() -> None:
+    world, part = (_loop_of(AntTask(frame=frame).open(training=True), "ant") for frame in ("world", "part"))
+    assert world.py_func.__qualname__ != part.py_func.__qualname__  # type: ignore[attr-defined]
