@@ -99,9 +99,7 @@ def _evolution(options: argparse.Namespace) -> Pieces:
 
 
 def _generation(options: argparse.Namespace) -> Pieces:
-    whole: Pieces = {
-        f"whole generations, {variant}": partial(_one, partial(compare_with_physics, variant)) for variant in VARIANTS
-    }
+    whole: Pieces = {f"whole generations, {variant}": partial(compare_with_physics, variant) for variant in VARIANTS}
     return whole | {
         f"parts of a generation, {variant}, {genome} genomes": partial(measure_parts, variant, genome)
         for variant, genome in product(DISSECTED_VARIANTS, ("array", "stock"))

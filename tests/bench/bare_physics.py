@@ -12,8 +12,8 @@ from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.compiling import compiled
 from exneat_cli.seeding import generator
-from exneat_cli.tasks import RUNNING, AntTask, Simulation
-from exneat_cli.tasks.robots.dynamics import AntWorld, mj_rnePostConstraint, mj_step, observe, step
+from exneat_cli.tasks import RUNNING, RobotTask, Simulation
+from exneat_cli.tasks.robots.dynamics import RobotWorld, drive, mj_rnePostConstraint, mj_step, observe, sense, step
 from tests.bench.measurement import RATIO, Bar, Pair, Row, VerificationError, seconds_of, speed_ratios
 from tests.bench.workload import TASK, Workload, open_runner
 
@@ -24,7 +24,7 @@ class Recording(NamedTuple):
     """What the bare loop needs to do an episode again, and what it must come to.
 
     Attributes:
-        controls: (steps, actuators), each between -1 and 1.
+        controls: (steps, actuators), in the actuators' own units.
         fitness: of the episode, its forward reward.
         final_x: of the trunk, in metres.
     """
@@ -35,7 +35,7 @@ class Recording(NamedTuple):
 
 
 @compiled
-def replay(world: AntWorld, controls: NDArray[np.float64]) -> None:
+def replay(world: RobotWorld, controls: NDArray[np.float64]) -> None:
     """Nothing but the physics of an episode: (steps, actuators) controls, from the state `world` is in."""
     for t in range(controls.shape[0]):
         for i in range(controls.shape[1]):
@@ -45,23 +45,31 @@ def replay(world: AntWorld, controls: NDArray[np.float64]) -> None:
         mj_rnePostConstraint(world.model, world.data)
 
 
-def record(task: AntTask, simulation: Simulation, brains: Brains, b: int) -> Recording:
+def record(task: RobotTask, simulation: Simulation, brains: Brains, b: int) -> Recording:
     """Do the episode of brain `b`, step by step, in the world that `simulation` was last reset to."""
     controls = np.zeros((task.max_steps, len(task.actuator_names)))
-    memory, terms, totals = np.zeros(memory_size(brains)), np.zeros(len(task.terms)), np.zeros(len(task.terms))
+    action, memory = np.zeros(len(task.actuator_names)), np.zeros(memory_size(brains))
+    terms, totals = np.zeros((2, len(task.terms)))
+    framed, sensed = simulation.sense is not None, memory[: task.sensed_size]
+    readings = np.zeros(task.observation_size) if framed else sensed
     simulation.rewind(simulation.world)
-    steps = _record(simulation.world, brains, b, memory, task.observation_size, controls, terms, totals)
-    return Recording(controls[:steps].copy(), float(totals[0]), trunk_x(simulation))
+    steps = _record(simulation.world, framed, brains, b, readings, sensed, memory, action, controls, terms, totals)
+    return Recording(controls[:steps].copy(), float(totals[0]), trunk_x(task, simulation))
 
 
 @compiled
-def _record(world, brains, b, memory, observation_size, controls, terms, totals):  # type: ignore[no-untyped-def]
+def _record(world, framed, brains, b, readings, sensed, memory, action, controls, terms, totals):  # type: ignore[no-untyped-def]
     """Writes `controls` and the sums of `terms`; returns the number of steps."""
     status, t = RUNNING, 0
     while status == RUNNING:
-        observe(world, memory[:observation_size])
-        activate(brains, b, memory, controls[t])
-        status = step(world, controls[t], terms)
+        observe(world, readings)
+        if framed:
+            sense(world, readings, sensed)
+        activate(brains, b, memory, action)
+        if framed:
+            drive(world, action)
+        status = step(world, action, terms)
+        controls[t] = world.ctrl
         totals += terms
         t += 1
     return t
@@ -96,13 +104,13 @@ def compare_with_bare_physics(workload: Workload, repetitions: int) -> Row:
 def _replay_one(simulation: Simulation, recording: Recording) -> float:
     simulation.rewind(simulation.world)
     seconds = seconds_of(lambda: replay(simulation.world, recording.controls))
-    check_x("replayed", trunk_x(simulation), recording.final_x)
+    check_x("replayed", trunk_x(TASK, simulation), recording.final_x)
     return seconds
 
 
-def trunk_x(simulation: Simulation) -> float:
+def trunk_x(task: RobotTask, simulation: Simulation) -> float:
     """Where the trunk is along x, in metres."""
-    row = np.zeros(len(TASK.trace_columns))
+    row = np.zeros(len(task.trace_columns))
     simulation.locate(simulation.world, row)
     return float(row[0])
 

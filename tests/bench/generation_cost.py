@@ -17,9 +17,9 @@ from exneat_cli.rollouts import Executor, Outcomes, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, generator
-from exneat_cli.tasks import AntTask, Simulation
-from exneat_cli.tasks.robots.dynamics import AntWorld, rewind
-from exneat_cli.wiring import Geometry
+from exneat_cli.tasks import AntTask, RobotTask, Simulation
+from exneat_cli.tasks.robots.dynamics import RobotWorld, rewind
+from exneat_cli.wiring import Geometry, Wiring
 from tests.bench.bare_physics import Recording, check_x, record, replay
 from tests.bench.measurement import RATIO, Bar, Row, VerificationError, seconds_of
 from tests.bench.two_threads import usable_cores
@@ -27,15 +27,19 @@ from tests.bench.two_threads import usable_cores
 _Item = TypeVar("_Item")
 
 VARIANTS = {
-    "neat": RunSettings(algorithm="neat"),
-    "exneat single/none": RunSettings(),
-    "exneat all/none": RunSettings(geometry=Geometry("all")),
-    "exneat all/full": RunSettings(geometry=Geometry("all"), linkage="full"),
+    "Ant, neat": RunSettings(algorithm="neat"),
+    "Ant, exneat single/none": RunSettings(),
+    "Ant, exneat all/none": RunSettings(geometry=Geometry("all")),
+    "Ant, exneat all/full": RunSettings(geometry=Geometry("all"), linkage="full"),
+    "Ant in its parts' frames, exneat single/joints": RunSettings(
+        task=AntTask(frame="part"), linkage="joints", wiring=Wiring(central=False, trunk="shared")
+    ),
+    "hexapod in its parts' frames, exneat auto/none": RunSettings(task=RobotTask(), geometry=Geometry("auto")),
 }
-"""All of population 100, with a central module."""
+"""All of population 100; where nothing else is said, with a central module."""
 GENERATIONS = 5
 """That are counted, each a ratio of its own; the one before them is not, since it compiles."""
-BAR = Bar(1.15, at_least=False)
+GENERATION_BAR, EPISODES_BAR = Bar(1.15, at_least=False), Bar(1.10, at_least=False)
 
 
 class WatchedRunner(Runner):
@@ -67,7 +71,7 @@ class WatchedRunner(Runner):
 
 
 @compiled
-def replay_from_start(world: AntWorld, controls: NDArray[np.float64]) -> float:
+def replay_from_start(world: RobotWorld, controls: NDArray[np.float64]) -> float:
     """`replay` from where the last reset had put the body; returns the x of the trunk at the end, in metres."""
     rewind(world)
     replay(world, controls)
@@ -84,7 +88,7 @@ class BarePhysics:
     """
 
     def __init__(self, settings: RunSettings, threads: int) -> None:
-        assert isinstance(settings.task, AntTask)
+        assert isinstance(settings.task, RobotTask)
         self._task = settings.task
         reset_scale = settings.noise.reset_scale
         self._simulations = [self._task.open_disturbed(training=True, reset_scale=reset_scale) for _ in range(threads)]
@@ -142,17 +146,20 @@ def _replay_one(simulation: Simulation, recording: Recording) -> None:
     check_x("replayed", replay_from_start(simulation.world, recording.controls), recording.final_x)
 
 
-def compare_with_physics(variant: str) -> Row:
-    """Wall seconds of whole generations over those of their physics on as many threads, one ratio each.
+def compare_with_physics(variant: str) -> list[Row]:
+    """Wall seconds of whole generations and of their episodes over those of the bare physics on as many threads.
 
     Args:
         variant: a key of `VARIANTS`.
+
+    Returns:
+        Two rows, with one ratio for each generation.
 
     Raises:
         VerificationError: an episode done again was another one.
     """
     settings, threads = VARIANTS[variant], usable_cores()
-    walls, ratios, episodes = [], [], []
+    walls, episodes, bare = [], [], []
     with (
         WatchedRunner(settings.task, settings.noise, Executor("threads", threads), training=True) as runner,
         BarePhysics(settings, threads) as physics,
@@ -161,11 +168,11 @@ def compare_with_physics(variant: str) -> Row:
         for _ in range(1 + GENERATIONS):
             walls.append(seconds_of(partial(training.advance, runner)))
             episodes.append(runner.seconds)
-            ratios.append(walls[-1] / physics.seconds(runner))
-    steps = training.history[-1]["env_steps"] - training.history[0]["env_steps"]
-    note = (
-        f"{steps / GENERATIONS:,.0f} steps in {np.median(walls[1:]):.3f} s a generation, "
-        f"{np.median(episodes[1:]):.3f} s of it episodes"
-    )
-    name = f"whole Ant generations, {variant} / bare mj_step x 5 + mj_rnePostConstraint, s, {threads} threads"
-    return Row(name, RATIO, ratios[1:], BAR, note)
+            bare.append(physics.seconds(runner))
+    steps = (training.history[-1]["env_steps"] - training.history[0]["env_steps"]) / GENERATIONS
+    rows = []
+    for what, seconds, bar in (("generations", walls, GENERATION_BAR), ("episodes", episodes, EPISODES_BAR)):
+        name = f"whole {what}, {variant} / bare mj_step + mj_rnePostConstraint, s, {threads} threads"
+        ratios = [ours / theirs for ours, theirs in zip(seconds[1:], bare[1:], strict=True)]
+        rows.append(Row(name, RATIO, ratios, bar, f"{steps:,.0f} steps in {np.median(seconds[1:]):.3f} s"))
+    return rows
