@@ -30,7 +30,8 @@ FAINT = 0.13
 """Opacity of what has no part in what the agent does."""
 _GREY, _INNER = styles.GREY, "#999999"
 _POINTS = 72.0  # per inch
-_LEAST_ROOM, _ROOM_TO_STAND = 6.2, 16.0  # points from one input to the next that a rotated and an upright index need
+_LEAST_ROOM = 5.4  # points from one input to the next that names need
+_LARGEST_TEXT, _SMALLEST_TEXT, _WIDTH_OF_LETTERS = 7.0, 3.5, 0.56  # sizes in points, and width as a share of them
 _BOW = 0.15  # how far links swing aside, as a share of their length; there and back swing to different sides
 _ALIKE = 0.98  # share of the weights whose widths differ: beside a single outlier all others would vanish
 _MANY_LINKS, _MANY_EDGES = 40, 200
@@ -188,29 +189,33 @@ def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: se
         if nodes:
             x, y = zip(*(places[node] for node in nodes), strict=True)
             axes.scatter(x, y, size, faces, marker=marker, edgecolors=rims, linewidths=0.7, zorder=3)
-    for output, actuator in enumerate(module.drives):
-        left, top = places[m, output]
-        name = champion.actuators[actuator].replace("_", " ")
-        axes.text(left, top + 0.08, name, fontsize=7, ha="center", va="bottom", zorder=5)
+    if not module.drives:
+        return
+    # The unit has a line of its own.
+    names = [champion.actuators[actuator].replace("_", " ").replace(" (", "\n(") for actuator in module.drives]
+    across = [places[m, output][0] for output in range(len(names))]
+    room = _POINTS * min((right - left for left, right in pairwise(across)), default=1.0)
+    widest = 1 + max(len(line) for name in names for line in name.split("\n"))
+    size = float(np.clip(room / (_WIDTH_OF_LETTERS * widest), _SMALLEST_TEXT, _LARGEST_TEXT))
+    for output, name in enumerate(names):
+        top = places[m, output][1] + 0.08
+        axes.text(across[output], top, name, fontsize=size, ha="center", va="bottom", linespacing=1.0, zorder=5)
 
 
 def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
-    """Write indices under the sensors where they fit, and a bracket with words under each group of inputs."""
+    """Write under each input what it reads, or where that does not fit how many inputs there are of each kind."""
     plan = champion.plan
     pins = plan.modules[m].pins
     x = [places[m, -1 - k][0] for k in range(len(pins))]
-    room = _POINTS * min((right - left for left, right in pairwise(x)), default=1.0)
+    if _POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
+        for k, name in enumerate(layout.input_names(champion, m)):
+            y = places[m, -1 - k][1] - 0.07
+            axes.text(x[k], y, name, fontsize=layout.NAME_SIZE, rotation=90, ha="center", va="top")
+        return
     for group in layout.input_groups(champion, m):
         y = places[m, -1 - group[0]][1]
-        kind = plan.kind_of(pins[group[0]])
-        if kind == "sensor" and room >= _LEAST_ROOM:
-            turn = 90 if room < _ROOM_TO_STAND else 0
-            for k in group:
-                axes.text(x[k], y - 0.06, str(pins[k].index), fontsize=5.5, rotation=turn, ha="center", va="top")
         left, right = x[group[0]], x[group[-1]]
-        axes.plot([left - 0.03, right + 0.03], [y - 0.28, y - 0.28], color=_GREY, linewidth=0.7)
-        # In two lines, as groups of links are narrow.
-        sources = {pins[k].module for k in group}
-        whose = plan.modules[sources.pop()].name.replace("_", " ") if len(sources) == 1 else "others"
-        words = {"sensor": "sensors, by index", "output": f"outputs of\n{whose}", "hidden": f"hidden of\n{whose}"}
-        axes.text((left + right) / 2, y - 0.31, words[kind], fontsize=6.0, ha="center", va="top")
+        axes.plot([left - 0.03, right + 0.03], [y - 0.1, y - 0.1], color=_GREY, linewidth=0.7)
+        words = {"sensor": "sensors", "output": "outputs\nof others", "hidden": "hidden nodes\nof others"}
+        count = f"{len(group)} {words[plan.kind_of(pins[group[0]])]}"
+        axes.text((left + right) / 2, y - 0.13, count, fontsize=6.0, ha="center", va="top")

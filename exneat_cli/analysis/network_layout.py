@@ -19,9 +19,11 @@ Places = dict[Node, tuple[float, float]]
 """(x, y) of inputs and nodes."""
 
 # Inches. Links run in the gap between boxes. What a box keeps free of nodes: at its top, above outputs that drive
-# something, at its bottom, at its sides.
+# something, at its sides, and at its bottom, besides the names of inputs.
 GAP = 0.3
-TITLE, OUTPUT_NAMES, INPUT_NAMES, SIDE = 0.32, 0.2, 0.6, 0.2
+TITLE, OUTPUT_NAMES, SIDE, BELOW = 0.32, 0.3, 0.2, 0.15
+# Of a name below an input: its size in points, inches per character, and the characters that are shown at most.
+NAME_SIZE, CHARACTER, LONGEST_NAME = 5.0, 0.035, 48
 # Least distances: of layers, of inputs, of outputs that carry a name, of a node from connections that pass it.
 LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
 
@@ -83,6 +85,18 @@ def input_groups(champion: Champion, m: int) -> list[list[int]]:
     return [list(group) for _, group in groupby(range(len(pins)), key=lambda k: plan.kind_of(pins[k]))]
 
 
+def input_names(champion: Champion, m: int) -> list[str]:
+    """What the inputs of module `m` read, cut to what is shown."""
+    names = [champion.name_of(pin).replace("_", " ") for pin in champion.plan.modules[m].pins]
+    return [name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..." for name in names]
+
+
+def below_inputs(champion: Champion) -> float:
+    """Inches below the inputs, alike in all modules: their longest name stands upright there."""
+    lengths = [len(name) for m in range(len(champion.plan.modules)) for name in input_names(champion, m)]
+    return BELOW + CHARACTER * max(8, *lengths)
+
+
 def depths(hidden: Iterable[Node], edges: Collection[Edge]) -> dict[Node, int]:
     """Find the layers of inputs, which is 0, and of hidden nodes: one more than that of their deepest source.
 
@@ -114,8 +128,8 @@ def natural_size(champion: Champion) -> tuple[float, float]:
     room = max(*(INPUT * count for count in slots), *(ACTUATOR * len(module.drives) for module in modules))
     deepest = max(depths(hidden_of(champion), edges_of(champion)).values(), default=0)
     width = columns * (2 * SIDE + room) + (columns - 1) * GAP
-    height = len(rows) * (TITLE + OUTPUT_NAMES + INPUT_NAMES + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
-    return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 10.0).clip(4.0))
+    height = len(rows) * (TITLE + OUTPUT_NAMES + below_inputs(champion) + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
+    return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 13.0).clip(4.0))
 
 
 def lay_out(champion: Champion, width: float, height: float) -> tuple[list[Bbox], Places]:
@@ -159,7 +173,7 @@ def _places(champion: Champion, m: int, box: Bbox) -> Places:
     module = champion.plan.modules[m]
     edges = [edge for edge in edges_of(champion) if edge[0][0] == m]
     hidden = [node for node in hidden_of(champion) if node[0] == m]
-    bottom, top = box.y0 + INPUT_NAMES, box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
+    bottom, top = box.y0 + below_inputs(champion), box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
     groups = input_groups(champion, m)
     slots = _spread(box, len(module.pins) + len(groups) - 1)
     # An empty slot between groups.

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-
-import numpy as np
 
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
@@ -41,13 +39,13 @@ def _show_task(task: Task) -> None:
     for part in (*task.parts, *filter(None, [task.trunk])):
         x, y = part.position
         print(f"{part.name}  at ({x:+.2f}, {y:+.2f}, {part.height:+.2f})")
-        drives = ", ".join(task.actuator_names[actuator] for actuator in part.actuators)
+        drives = "; ".join(task.actuator_names[actuator] for actuator in part.actuators)
         remarks = {**task.remarks_on(part), "drives": drives or "nothing itself"}
-        remarks["senses"] = ", ".join(task.sensor_names[entry] for entry in part.sensors)
+        remarks["senses"] = "; ".join(task.sensor_names[entry] for entry in part.sensors)
         if part.trunk:
             remarks["trunk"] = f"{len(part.trunk)} entries as seen from here, for wiring.trunk=shared"
         for word, text in remarks.items():
-            print(textwrap.fill(text, 110, initial_indent=f"  {word:<8} ", subsequent_indent=" " * 11))
+            print(_filled(word, text))
         print()
     print("geometry  which parts share a network: " + " ".join(part.name for part in task.parts))
     for name in GEOMETRIES[:-1]:
@@ -58,6 +56,10 @@ def _show_task(task: Task) -> None:
         print(f"{name:<8}  {vector}")
     if len(task.parts) == 1:
         print("One part: its module is all there is, so modules make no difference, and ExNEAT trains what NEAT does.")
+
+
+def _filled(word: str, text: str) -> str:
+    return textwrap.fill(text, 110, initial_indent=f"  {word:<8} ", subsequent_indent=" " * 11)
 
 
 def _show(run: RunDirectory) -> None:
@@ -75,11 +77,11 @@ def _show(run: RunDirectory) -> None:
     for module in champion.plan.modules:
         x, y = module.position
         print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
-        print(f"  senses   {_ranges(module.sensors) or 'nothing itself'}")
-        for link in _links(champion, module):
-            print(f"  reads    {link}")
-        drives = ", ".join(champion.actuators[actuator] for actuator in module.drives)
-        print(f"  drives   {drives or f'nothing; {module.outputs} outputs for others'}")
+        for word, texts in (("senses", _sensed(champion, module)), ("reads", _links(champion, module))):
+            for text in texts:
+                print(_filled(word, text))
+        drives = "; ".join(champion.actuators[actuator] for actuator in module.drives)
+        print(_filled("drives", drives or f"nothing; {module.outputs} outputs for others"))
         genome = champion.genomes[module.subpopulation]
         sizes = (
             f"{len(module.pins)} inputs, {len(genome.nodes) - module.outputs} hidden nodes, {module.outputs} outputs"
@@ -90,16 +92,19 @@ def _show(run: RunDirectory) -> None:
     print(f"test: fitness {test.fitness_mean:.4g} (sd {test.fitness_std:.3g}), {test.episodes} episodes")
 
 
+def _sensed(champion: Champion, module: Module) -> Iterable[str]:
+    yield "; ".join(champion.sensors[entry] for entry in module.sensors) or "nothing itself"
+
+
 def _links(champion: Champion, module: Module) -> Iterable[str]:
-    groups: dict[tuple[int, str, bool], list[int]] = {}
+    groups: dict[tuple[int, str, bool], list[str]] = {}
     for pin in module.pins:
         if not pin.is_sensor:
-            kind = champion.plan.kind_of(pin)
-            first = champion.plan.modules[pin.module].outputs if kind == "hidden" else 0
-            groups.setdefault((pin.module, kind, pin.delayed), []).append(pin.index - first)
-    for (source, kind, delayed), indices in groups.items():
+            group = pin.module, champion.plan.kind_of(pin), pin.delayed
+            groups.setdefault(group, []).append(champion.node_name(pin))
+    for (source, kind, delayed), names in groups.items():
         when = "of the previous step" if delayed else "of this step"
-        yield f"{kind} {_ranges(indices)} of {champion.plan.modules[source].name}, {when}"
+        yield f"{kind} {', '.join(names)} of {champion.plan.modules[source].name}, {when}"
 
 
 def _list(output: Path) -> None:
@@ -122,9 +127,3 @@ def _list(output: Path) -> None:
 def _status(run: RunDirectory, manifest: Manifest) -> str:
     """The manifest's status; a killed process cannot write its own."""
     return "killed" if manifest.status == RUNNING and not run.is_held() else manifest.status
-
-
-def _ranges(indices: Sequence[int]) -> str:
-    """Whole numbers in words, e.g. ``5-6, 19-20``; order is kept where it is not ascending."""
-    parts = np.split(np.array(indices, int), np.flatnonzero(np.diff(indices) != 1) + 1) if indices else []
-    return ", ".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)

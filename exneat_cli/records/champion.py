@@ -22,10 +22,13 @@ from exneat_cli.errors import ConfigError, ExneatError, check_real, check_whole
 from exneat_cli.records.files import write_whole
 from exneat_cli.records.manifest import Score
 from exneat_cli.records.plain import Real, Word, build, converted, read_json
-from exneat_cli.wiring import Plan
+from exneat_cli.wiring import Pin, Plan
 
-CHAMPION_FORMAT = 2
+CHAMPION_FORMAT = 3
 _LARGEST, _MOST_MODULES = 1_000_000, 1000
+_UNSHOWN = r"\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f\ud800-\udfff"
+_Name = Annotated[str, Meta(pattern=rf"^[^{_UNSHOWN}]{{1,200}}\Z")]
+"""What a task calls a part, a sensor or an actuator: nothing that a terminal would obey."""
 _Id = Annotated[int, Meta(ge=0, le=2**62)]
 
 
@@ -93,7 +96,8 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     format: int = CHAMPION_FORMAT
     variant: Word
     task: dict[Word, Any]
-    actuators: Annotated[tuple[Word, ...], Meta(max_length=_LARGEST)]
+    sensors: Annotated[tuple[_Name, ...], Meta(max_length=_LARGEST)]
+    actuators: Annotated[tuple[_Name, ...], Meta(max_length=_LARGEST)]
     feed_forward: bool
     scores: Scores
     plan: Plan
@@ -102,6 +106,19 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def brain(self) -> Brains:
         """The runnable network."""
         return assemble(self.plan, [[genome.in_arrays() for genome in self.genomes]], feed_forward=self.feed_forward)
+
+    def name_of(self, pin: Pin) -> str:
+        """What a pin reads, in words, e.g. ``hip_1 position (rad)``, ``hidden 0 of front_left``."""
+        if pin.is_sensor:
+            return self.sensors[pin.index]
+        return f"{self.plan.kind_of(pin)} {self.node_name(pin)} of {self.plan.modules[pin.module].name}"
+
+    def node_name(self, pin: Pin) -> str:
+        """The node that a link reads: an output by what it drives, if anything; others by number, each kind from 0."""
+        source, index = self.plan.modules[pin.module], pin.index
+        if index < len(source.drives):
+            return self.actuators[source.drives[index]]
+        return str(index - source.outputs if index >= source.outputs else index)
 
 
 def read_champion(path: Path) -> Champion:
@@ -123,11 +140,12 @@ def _check(champion: Champion) -> None:
     """Refuse what types cannot: sizes out of bounds, and parts that do not fit together."""
     plan, genomes = champion.plan, champion.genomes
     check_whole("plan.observation_size", plan.observation_size, 1, _LARGEST)
+    check_whole("plan.observation_size", plan.observation_size, len(champion.sensors), len(champion.sensors))
     check_whole("plan.action_size", plan.action_size, len(champion.actuators), len(champion.actuators))
     check_whole("number of modules", len(plan.modules), 1, _MOST_MODULES)
     for k, module in enumerate(plan.modules):
         key = f"plan.modules[{k}]"
-        converted(module.name, Word, f"{key}.name")
+        converted(module.name, _Name, f"{key}.name")
         check_whole(f"{key}.outputs", module.outputs, 1, _LARGEST)
         check_whole(f"{key}.hidden", module.hidden, 0, _LARGEST)
         for coordinate in module.position:

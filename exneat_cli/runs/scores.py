@@ -96,6 +96,7 @@ def _champion(settings: RunSettings, team: Team, scores: Scores) -> Champion:
     return Champion(
         variant=settings.variant,
         task=settings.to_plain()["task"],
+        sensors=settings.task.sensor_names,
         actuators=settings.task.actuator_names,
         feed_forward=settings.evolution.feed_forward,
         plan=settings.plan,

@@ -29,6 +29,8 @@ GUARD = 64
 """Entries behind each array, which nothing may write to."""
 RESET_SCALE = 0.1
 """Noise on the initial pose, as runs have it unless told otherwise."""
+LONGEST_NAME = 200
+"""Characters of the name of a sensor, an actuator, a part or a reward term."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _tried: set[tuple[type[Task], str]] = set()
 
@@ -53,6 +55,9 @@ def check_description(task: Task) -> None:
             _check_names(f"{kind}.{member}", getattr(task, member), least=member != "trace_columns")
         for member in ("observation_size", "sensed_size", "longest_episode"):
             check_whole(f"{kind}.{member}", getattr(task, member), 1, 100_000_000)
+        if not _are_names(task.sensor_names) or len(task.sensor_names) != task.sensed_size:
+            expected = f"a tuple of texts, one for each of {task.sensed_size} entries that are sensed"
+            raise ConfigError(f"{kind}.sensor_names", expected, task.sensor_names)
         _check_parts(task)
         _check_numbers(task)
 
@@ -68,9 +73,13 @@ def _check_plain(task: Task) -> None:
             raise ConfigError(f"task.{field.name}", expected, value) from None
 
 
+def _are_names(names: Any) -> bool:
+    texts = isinstance(names, tuple) and all(isinstance(name, str) for name in names)
+    return texts and all(name.isprintable() and 0 < len(name) <= LONGEST_NAME for name in names)
+
+
 def _check_names(key: str, names: Any, *, least: int) -> None:
-    texts = isinstance(names, tuple) and all(isinstance(name, str) and name.isprintable() and name for name in names)
-    if not texts or len(set(names)) < len(names) or len(names) < least:
+    if not _are_names(names) or len(set(names)) < len(names) or len(names) < least:
         raise ConfigError(key, f"a tuple of {'at least one text' if least else 'texts'}, all different", names)
 
 

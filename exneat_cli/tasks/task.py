@@ -127,7 +127,7 @@ class Task(ABC):
     @property
     @abstractmethod
     def actuator_names(self) -> tuple[str, ...]:
-        """One name per entry of the action."""
+        """One name per entry of the action, with the unit of what it does if it has one, e.g. ``hip_1 (N m)``."""
 
     @property
     @abstractmethod

@@ -42,9 +42,10 @@ def a_champion(
     modules: Sequence[dict[str, Any]], genomes: Sequence[dict[str, Any]], actuators: Sequence[str], sensors: int
 ) -> dict[str, Any]:
     return {
-        "format": 2,
+        "format": 3,
         "variant": "made-up",
         "task": {"name": "made_up"},
+        "sensors": [f"eye {k} (cd)" for k in range(sensors)],
         "actuators": list(actuators),
         "feed_forward": True,
         "scores": {"test": a_score(0.75, 0.75)},
@@ -97,4 +98,4 @@ def modular_champion() -> dict[str, Any]:
     central = a_module("central", (0.0, 0.0), 1, pins=pins, outputs=2, drives=[0, 1])
     leg_genome = a_genome([0, 1], [(-1, 1, 0.5), (-2, 1, -0.8), (-3, 1, 0.2), (1, 0, 1.2)])
     middle = a_genome([0, 1], [(-k, k % 2, 0.4 * k - 1.0) for k in range(1, 5)])
-    return a_champion([*legs, central], [leg_genome, middle], ["hip_1", "ankle_1"], 9)
+    return a_champion([*legs, central], [leg_genome, middle], ["hip_1 (3 N m)", "ankle_1"], 9)

@@ -144,8 +144,15 @@ def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_th
     links = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
     assert [link.get_linestyle() == "-" for link in links] == [False] * 4 + [True] * 3
     texts = {text.get_text() for text in axes.texts}
-    assert {*map(str, range(9)), "hip 1", "ankle 1", "front left  (genome 1, shared by 4)", "central"} <= texts
-    assert {"sensors, by index", "hidden of\nfront right", "outputs of\nothers"} <= texts
+    assert {f"eye {k} (cd)" for k in range(9)} <= texts
+    assert {"hip 1\n(3 N m)", "ankle 1", "front left  (genome 1, shared by 4)", "central"} <= texts
+    assert {"hidden 0 of front right", "output 0 of back left"} <= texts
+
+
+def test_inputs_that_are_too_many_to_be_named_are_counted() -> None:
+    body = a_module("body", (0.0, 0.0), 0, pins=[reads(k) for k in range(200)], outputs=1, drives=[0])
+    axes = axes_of(champion_of(a_champion([body], [a_genome([0], [(-1, 0, 1.0)])], ["hip"], 200)))
+    assert {text.get_text() for text in axes.texts} == {"body", "hip", "200 sensors"}
 
 
 def test_the_legend_speaks_of_links_and_loops_only_where_there_are_any() -> None:

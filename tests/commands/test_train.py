@@ -141,9 +141,10 @@ def test_inspect_shows_sensors_joints_and_sizes_of_every_module(
     assert main(["inspect", f"run={the_run(tmp_path)}"]) == 0
     shown = capfd.readouterr().out
     assert "5 modules, 3 subpopulations, feed-forward" in shown
-    assert "senses   5-6, 19-20, 33-50" in shown
-    assert "hidden 0-3 of back_left, of the previous step" in shown
-    assert "drives   hip_4, ankle_4, hip_1, ankle_1, hip_2, ankle_2, hip_3, ankle_3" in shown
+    assert "senses   hip_1 position (rad); ankle_1 position (rad); hip_1 velocity (rad/s);" in shown
+    assert "hidden 0, 1, 2, 3 of back_left, of the previous step" in shown
+    assert "output hip_4 (150 N m), ankle_4 (150 N m), hip_1 (150 N m)" in " ".join(shown.split())
+    assert "drives   hip_4 (150 N m); ankle_4 (150 N m); hip_1 (150 N m)" in shown
     assert "48 inputs" in shown
 
 

@@ -98,10 +98,8 @@ def test_the_tables_of_ant_say_who_senses_and_drives_what() -> None:
         assert f"| {first}, {first + 1} | angles of hip {leg} and ankle {leg} |" in page
         assert re.search(rf"\| {last - 17}-{last} \| the same for .*leg {leg} \|", page)
         hip, ankle = part.actuators
-        assert (
-            f"| {hip}, {ankle} | {', '.join(task.actuator_names[k].replace('_', ' ') for k in part.actuators)} |"
-            in page
-        )
+        driven = ", ".join(task.actuator_names[k].split(" (")[0].replace("_", " ") for k in part.actuators)
+        assert f"| {hip}, {ankle} | {driven} |" in page
 
 
 def test_the_picture_of_the_readme_is_drawn_from_the_wiring_plans(tmp_path: Path) -> None:

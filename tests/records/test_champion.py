@@ -35,6 +35,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     champion = Champion(
         variant=run.variant,
         task={"name": "ant"},
+        sensors=run.task.sensor_names,
         actuators=run.task.actuator_names,
         feed_forward=True,
         scores=Scores(test=Score(3, 1.0, 0.5, 2.0, 0.5, 0, (0.5, 1.0, 1.5))),
@@ -141,7 +142,7 @@ def test_whatever_is_changed_in_a_champion_it_is_refused_or_stays_within_its_mem
 DAMAGES: list[tuple[Place, Any, str]] = [
     (("wurst",), 1, "unknown field wurst"),
     (("plan", "modules", 0, "pins", 0, "wurst"), 1, r"plan\.modules\[0\]\.pins\[0\]\.wurst: unknown key"),
-    (("format",), True, "expected format 2, got True"),
+    (("format",), True, "expected format 3, got True"),
     (("feed_forward",), 1, "feed_forward: expected true or false, got 1"),
     (("variant",), "\x1b[31mred", r"variant: expected text .*, got '\\x1b\[31mred'"),
     (("plan", "observation_size"), 10**12, "plan.observation_size: expected a whole number from 1 to"),

@@ -56,7 +56,7 @@ class GridTask(Task):
     observation_size: ClassVar[int] = 4 * CHANNELS
     actuator_names: ClassVar[tuple[str, ...]] = MOVES
     sensor_names: ClassVar[tuple[str, ...]] = tuple(
-        f"{way}, {channel} channel" for way in ("left", "right", "up", "down") for channel in ("first", "second")
+        f"{way}, channel {1 + channel}" for way in MOVES[:STAY] for channel in range(CHANNELS)
     )
     parts: ClassVar[tuple[Part, ...]] = (
         Part("left", sensors=(0, 1), actuators=(0,), position=(-1.0, 0.0)),

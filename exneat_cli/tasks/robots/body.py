@@ -19,6 +19,8 @@ from exneat_cli.errors import ConfigError
 from exneat_cli.tasks.robots.likeness import MIRROR, Pose, Relation, relate
 
 SYMMETRIES = ("turn", "mirror")
+LONGEST_NAME = 100
+"""Characters of a model's names that are shown."""
 _JOINT_ACTUATORS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
@@ -83,7 +85,7 @@ def take_apart(
         _named_parts(model, trunk, parts) if parts else {tuple(subtree(model, b)): "" for b in _outermost(pose, trunk)}
     )
     bodies = sorted(named, key=lambda part: _from_front_to_back(pose, part) if order == "position" else part)
-    names = [named[part] or ("" if by_place else model.body(part[0]).name) for part in bodies]
+    names = [named[part] or ("" if by_place else printable(model.body(part[0]).name)) for part in bodies]
     names = _unique_names(names, pose, bodies)
     turns = {(a, b): r for a in bodies for b in bodies if (r := _turn(pose, a, b, bodies))}
     mirrorings = {(a, b): r for a in bodies for b in bodies if a != b and (r := relate(pose, "mirror", MIRROR, a, b))}
@@ -256,6 +258,11 @@ def _itself(pose: Pose, part: Sequence[int]) -> Relation:
     actuators = tuple(actuator for joint in joints for actuator in pose.actuators_of(joint))
     ones = (1,) * len(joints), (1,) * len(actuators)
     return Relation("itself", np.eye(3), tuple(part), joints, ones[0], actuators, ones[1])
+
+
+def printable(name: str) -> str:
+    """A name of the model as far as it can be shown: files may hold line breaks and names without end."""
+    return "".join(filter(str.isprintable, name))[:LONGEST_NAME]
 
 
 def _label(model: mujoco.MjModel, actuator: int) -> str:

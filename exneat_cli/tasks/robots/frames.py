@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from exneat_cli.compiling import compiled
 
 VIEW = (
-    ("height", "m"),
-    *((f"direction of gravity {axis}", "-") for axis in "xyz"),
-    *((f"direction of travel {axis}", "-") for axis in "xyz"),
-    *((f"velocity {axis}", "m/s") for axis in "xyz"),
-    *((f"angular velocity {axis}", "rad/s") for axis in "xyz"),
+    ("trunk height", "m", -1, False),
+    *(("direction of gravity", "", axis, False) for axis in range(3)),
+    *(("direction of travel", "", axis, False) for axis in range(3)),
+    *(("trunk velocity", "m/s", axis, False) for axis in range(3)),
+    *(("trunk angular velocity", "rad/s", axis, True) for axis in range(3)),
 )
-"""What a view of the trunk consists of, with units: 13 numbers."""
+"""What a view of the trunk consists of, 13 numbers: name, unit, axis (-1: none), whether it is of a pseudovector."""
 
 
 class Frames(NamedTuple):

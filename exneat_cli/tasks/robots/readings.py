@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.tasks.robots.body import Body, subtree
+from exneat_cli.tasks.robots.body import Body, printable, subtree
 
-FORCES = (*((f"torque {axis}", "N m") for axis in "xyz"), *((f"force {axis}", "N") for axis in "xyz"))
-"""Entries of MuJoCo's `cfrc_ext` per body, in the world's axes."""
+FORCES = (("torque", "N m"), ("force", "N"))
+"""Vectors of MuJoCo's `cfrc_ext` per body, three entries each, in the world's axes."""
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -20,7 +20,8 @@ class Readings(NamedTuple):
     """The entries of an observation: positions first, then velocities, then contact forces.
 
     Attributes:
-        names, units: of all entries.
+        names: of all entries, without units.
+        units: of all entries; empty for what has none.
         positions: which entries of `qpos` are read, in order: all but the root's place on the ground.
         velocities: which entries of `qvel`.
         bodies: whose contact forces, six each; empty where none are sensed.
@@ -45,7 +46,31 @@ class Readings(NamedTuple):
         """Indices of the first of the six contact forces of each body; none where they are not sensed."""
         first = len(self.positions) + len(self.velocities)
         sensed = self.bodies.tolist()
-        return [first + len(FORCES) * sensed.index(body) for body in bodies if body in sensed]
+        return [first + 3 * len(FORCES) * sensed.index(body) for body in bodies if body in sensed]
+
+
+def body_name(model: mujoco.MjModel, body: int) -> str:
+    """What a body is called in the names of sensors."""
+    return printable(model.body(body).name) or f"body {body}"
+
+
+def joint_name(model: mujoco.MjModel, joint: int) -> str:
+    """What a joint is called in the names of sensors and actuators."""
+    return printable(model.joint(joint).name) or f"joint {joint}"
+
+
+def actuator_names(model: mujoco.MjModel) -> tuple[str, ...]:
+    """The joint that each actuator drives, and the torque or force of a motor at an action of 1."""
+    named = []
+    for actuator, joint in enumerate(model.actuator_trnid[:, 0].tolist()):
+        name, unit = joint_name(model, joint), "N" if model.jnt_type[joint] == _SLIDE else "N m"
+        rules = (model.actuator_gaintype, model.actuator_biastype, model.actuator_dyntype)
+        if not any(int(rule[actuator]) for rule in rules):  # all fixed or none: a motor
+            highest = float(model.actuator_ctrlrange[actuator, 1]) if model.actuator_ctrllimited[actuator] else 1.0
+            gear = float(model.actuator_gear[actuator, 0])
+            name += f" ({highest * gear * float(model.actuator_gainprm[actuator, 0]):g} {unit})"
+        named.append(name)
+    return tuple(named)
 
 
 def read_off(model: mujoco.MjModel, body: Body, *, contact_forces: bool) -> Readings:
@@ -55,21 +80,26 @@ def read_off(model: mujoco.MjModel, body: Body, *, contact_forces: bool) -> Read
     velocities: list[tuple[int, str, str]] = []
     for joint in (j for j in range(model.njnt) if model.jnt_bodyid[j] in bodies):
         first, speed, kind = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), int(model.jnt_type[joint])
-        name, length = model.joint(joint).name or f"joint {joint}", "m" if kind == _SLIDE else "rad"
+        name, length = joint_name(model, joint), "m" if kind == _SLIDE else "rad"
         if kind == _FREE:
-            turned = [(first + 3 + k, f"trunk orientation {axis}", "-") for k, axis in enumerate("wxyz")]
+            turned = [(first + 3 + k, f"trunk orientation {axis}", "") for k, axis in enumerate("wxyz")]
             positions += [(first + 2, "trunk height", "m"), *turned]
             velocities += [(speed + k, f"trunk velocity {axis}", "m/s") for k, axis in enumerate("xyz")]
             velocities += [(speed + 3 + k, f"trunk angular velocity {axis}", "rad/s") for k, axis in enumerate("xyz")]
         elif kind == int(mujoco.mjtJoint.mjJNT_BALL):
-            positions += [(first + k, f"{name} orientation {axis}", "-") for k, axis in enumerate("wxyz")]
+            positions += [(first + k, f"{name} orientation {axis}", "") for k, axis in enumerate("wxyz")]
             velocities += [(speed + k, f"{name} angular velocity {axis}", "rad/s") for k, axis in enumerate("xyz")]
         else:
             if joint not in body.root or kind != _SLIDE or abs(model.jnt_axis[joint][2]) > 0.5:
                 positions.append((first, f"{name} position", length))
             velocities.append((speed, f"{name} velocity", f"{length}/s"))
     forced = bodies if contact_forces else []
-    forces = [(0, f"{model.body(b).name or f'body {b}'} contact {what}", unit) for b in forced for what, unit in FORCES]
+    forces = [
+        (0, f"{body_name(model, b)} contact {what} {axis}", unit)
+        for b in forced
+        for what, unit in FORCES
+        for axis in "xyz"
+    ]
     _, names, units = zip(*positions, *velocities, *forces, strict=True)
     indices = [np.array(each, np.int64) for each in ([p[0] for p in positions], [v[0] for v in velocities], forced)]
     return Readings(names, units, *indices)

@@ -23,7 +23,7 @@ from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real,
 from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
 from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
-from exneat_cli.tasks.robots.readings import Readings, read_off
+from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
 from exneat_cli.tasks.task import Part, Simulation, Task, setting
 
@@ -112,23 +112,22 @@ class RobotTask(Task):
     @property
     def sensor_names(self) -> tuple[str, ...]:
         """Name and unit of what is sensed, entry by entry, e.g. ``hip_1 position (rad)``."""
-        sensing = self._anatomy[2]
-        return tuple(f"{name} ({unit})" for name, unit in zip(sensing.names, sensing.units, strict=True))
+        return self._anatomy[2].names
 
     def remarks_on(self, part: Part) -> dict[str, str]:
         """Its bodies, which part it is alike, and its joints with the signs that it senses them with."""
         model, (body, _, _) = load(self.model), self._anatomy
         if part == self.trunk:
-            return {"bodies": ", ".join(model.body(each).name for each in body.core)}
+            return {"bodies": ", ".join(body_name(model, each) for each in body.core)}
         limb = body.limbs[self.parts.index(part)]
         first = next(each for each in body.limbs if each.likeness == limb.likeness)
         relation = limb.relation
         signed = zip(relation.joints, relation.joint_signs, strict=True)
         like = "" if limb is first else f": a {relation.name} of {first.name}"
         return {
-            "bodies": ", ".join(model.body(each).name for each in relation.bodies),
+            "bodies": ", ".join(body_name(model, each) for each in relation.bodies),
             "class": f"{limb.likeness}{like}",
-            "joints": ", ".join(f"{'+-'[sign < 0]}{model.joint(joint).name}" for joint, sign in signed),
+            "joints": ", ".join(f"{'+-'[sign < 0]}{joint_name(model, joint)}" for joint, sign in signed),
         }
 
     @property
@@ -143,9 +142,8 @@ class RobotTask(Task):
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
-        """The joints that are driven, in the order of the action."""
-        model = load(self.model)
-        return tuple(model.joint(joint).name or f"joint {joint}" for joint in model.actuator_trnid[:, 0])
+        """The joints that are driven, in the order of the action, with what an action of 1 gives them."""
+        return actuator_names(load(self.model))
 
     @property
     def longest_episode(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from exneat_cli.tasks.robots.body import Body, Limb
 from exneat_cli.tasks.robots.frames import VIEW, Frames
 from exneat_cli.tasks.robots.likeness import MIRROR, Pose, relate
-from exneat_cli.tasks.robots.readings import FORCES, Readings
+from exneat_cli.tasks.robots.readings import FORCES, Readings, body_name
 from exneat_cli.tasks.task import Part
 
 
@@ -21,14 +22,13 @@ class Sensing(NamedTuple):
     """What is sensed, and by whom.
 
     Attributes:
-        names, units: of all entries.
+        names: of all entries, with units. In parts' own frames, entries of one name are one number.
         parts: in the body's order.
         trunk: the trunk's own entries, and the actuators of its own joints.
         frames: how readings become entries, where they are not the entries.
     """
 
     names: tuple[str, ...]
-    units: tuple[str, ...]
     parts: tuple[Part, ...]
     trunk: Part
     frames: Frames
@@ -40,7 +40,7 @@ def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensi
     def entries(joints: Iterable[int], bodies: Iterable[int]) -> tuple[list[int], list[int]]:
         moved = [_entries_of_joint(model, readings, joint) for joint in joints]
         positions, velocities = ([entry for each in moved for entry in each[kind]] for kind in (0, 1))
-        forces = [first + k for first in readings.forces(bodies) for k in range(len(FORCES))]
+        forces = [first + k for first in readings.forces(bodies) for k in range(3 * len(FORCES))]
         return positions + velocities, forces
 
     core, core_forces = entries(_joints_of_core(model, body), body.core)
@@ -52,7 +52,8 @@ def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensi
         parts.append(replace(part, is_mirrored=False))
     nothing = np.full((1, len(VIEW)), -1, np.int64)
     frames = _frames(model, body, readings, _Layout(model, readings), np.eye(3)[None], nothing)
-    return Sensing(readings.names, readings.units, tuple(parts), trunk, frames)
+    names = map(_with_unit, readings.names, readings.units)
+    return Sensing(tuple(names), tuple(parts), trunk, frames)
 
 
 class _Layout:
@@ -61,34 +62,34 @@ class _Layout:
     def __init__(self, model: mujoco.MjModel, readings: Readings) -> None:
         self.model, self.readings = model, readings
         self.names: list[str] = []
-        self.units: list[str] = []
         self.scalars: list[tuple[int, int, int]] = []
         self.vectors: list[tuple[int, int, int, bool]] = []
 
     def add(self, name: str, unit: str) -> int:
-        self.names.append(name)
-        self.units.append(unit)
+        self.names.append(_with_unit(name, unit))
         return len(self.names) - 1
 
-    def add_joints(self, joints: Sequence[int], signs: Sequence[int], suffix: str = "") -> list[int]:
-        """Positions of all joints, then their velocities."""
+    def add_joints(self, joints: Sequence[int], signs: Sequence[int]) -> list[int]:
+        """Positions of all joints, then their velocities; names begin with the sign."""
         found = []
         for kind in (0, 1):
             for joint, sign in zip(joints, signs, strict=True):
                 for entry in _entries_of_joint(self.model, self.readings, joint)[kind]:
-                    found.append(self.add(self.readings.names[entry] + suffix, self.readings.units[entry]))
+                    name = f"{'+-'[sign < 0]}{self.readings.names[entry]}".removeprefix("+")
+                    found.append(self.add(name, self.readings.units[entry]))
                     self.scalars.append((entry, found[-1], sign))
         return found
 
-    def add_forces(self, bodies: Iterable[int], frame: int, suffix: str) -> list[int]:
-        """Torque and force on each body, turned into a frame."""
+    def add_forces(self, bodies: Iterable[int], frame: int, move: NDArray[np.float64]) -> list[int]:
+        """Torque and force on each body, turned into a frame by its move."""
         found = []
-        for first in self.readings.forces(bodies):
-            for offset in (0, 3):
-                entries = range(first + offset, first + offset + 3)
-                added = [self.add(self.readings.names[entry] + suffix, self.readings.units[entry]) for entry in entries]
-                self.vectors.append((entries[0], added[0], frame, offset == 0))
-                found += added
+        for body in bodies:
+            for first in self.readings.forces([body]):
+                for k, (what, unit) in enumerate(FORCES):
+                    name, is_pseudo = f"{body_name(self.model, body)} contact {what}", what == "torque"
+                    added = [self.add(f"{name}, {_direction(move, axis, is_pseudo)}", unit) for axis in range(3)]
+                    self.vectors.append((first + 3 * k, added[0], frame, is_pseudo))
+                    found += added
         return found
 
 
@@ -105,7 +106,7 @@ def in_own_frames(model: mujoco.MjModel, body: Body, readings: Readings) -> Sens
     own = []
     for limb, frame in zip(body.limbs, frame_of, strict=True):
         joints = layout.add_joints(limb.relation.joints, limb.relation.joint_signs)
-        own.append((joints, layout.add_forces(limb.relation.bodies, frame, f" in the frame of {limb.name}")))
+        own.append((joints, layout.add_forces(limb.relation.bodies, frame, moves[frame])))
     any_mirrored = any(np.linalg.det(move) < 0.0 for move in moves)
     seen_mirrored = [
         _mirrored_joints(pose, layout, limb, joints) if any_mirrored else joints
@@ -114,13 +115,13 @@ def in_own_frames(model: mujoco.MjModel, body: Body, readings: Readings) -> Sens
     views = np.full((len(moves), len(VIEW)), -1, np.int64)
     trunk_blocks = []
     for frame, move in enumerate(moves):
-        suffix = "" if frame == 0 else f" as seen from frame {frame}"
         first = len(layout.names)
         for k in _varying(model, body):
-            views[frame, k] = layout.add(f"trunk {VIEW[k][0]}{suffix}", VIEW[k][1])
+            what, unit, axis, is_pseudo = VIEW[k]
+            views[frame, k] = layout.add(what if axis < 0 else f"{what}, {_direction(move, axis, is_pseudo)}", unit)
         core = [joint for joint in _joints_of_core(model, body) if joint not in body.root]
-        layout.add_joints(core, [_sign_under(pose, move, joint) for joint in core], suffix)
-        layout.add_forces(body.core, frame, suffix)
+        layout.add_joints(core, [_sign_under(pose, move, joint) for joint in core])
+        layout.add_forces(body.core, frame, move)
         trunk_blocks.append(tuple(range(first, len(layout.names))))
     parts = tuple(
         _part(limb, (*joints, *forces), joints, mirrored, trunk_blocks[frame])
@@ -128,7 +129,7 @@ def in_own_frames(model: mujoco.MjModel, body: Body, readings: Readings) -> Sens
     )
     trunk = Part("trunk", trunk_blocks[0], _actuators_of_core(model, body), (0.0, 0.0))
     frames = _frames(model, body, readings, layout, np.array(moves), views)
-    return Sensing(tuple(layout.names), tuple(layout.units), parts, trunk, frames)
+    return Sensing(tuple(layout.names), parts, trunk, frames)
 
 
 def _frames(
@@ -209,7 +210,23 @@ def _mirrored_joints(pose: Pose, layout: _Layout, limb: Limb, joints: list[int])
     signs = [own * sign for own, sign in zip(limb.relation.joint_signs, image.joint_signs, strict=True)]
     if image.joints == limb.relation.joints and signs == list(limb.relation.joint_signs):
         return joints
-    return layout.add_joints(image.joints, signs, " as a mirrored part sees it")
+    return layout.add_joints(image.joints, signs)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} ({unit})" if unit else name
+
+
+def _direction(move: NDArray[np.float64], axis: int, is_pseudo: bool) -> str:
+    """Where an axis of a frame points, seen from the trunk: a mirrored frame's pseudovectors count the other way."""
+    handedness = np.linalg.det(move) if is_pseudo else 1.0
+    x, y, z = move[:, axis] * handedness
+    turns_about = "about " if is_pseudo else ""
+    if abs(z) > 0.5:
+        return turns_about + ("up" if z > 0.0 else "down")
+    degrees = round(math.degrees(math.atan2(y, x)))
+    named = {0: "forward", 90: "left", -90: "right", 180: "backward", -180: "backward"}
+    return turns_about + named.get(degrees, f"{abs(degrees)} degrees {'left' if degrees > 0 else 'right'}")
 
 
 def _sign_under(pose: Pose, move: NDArray[np.float64], joint: int) -> int:
