@@ -8,6 +8,8 @@ import runpy
 from pathlib import Path
 from typing import Any
 
+import matplotlib.image
+import numpy as np
 import pytest
 
 from exneat_cli.records.champion import Champion, Connection, Node, Scores
@@ -100,6 +102,14 @@ def test_the_tables_of_ant_say_who_senses_and_drives_what() -> None:
         hip, ankle = part.actuators
         driven = ", ".join(task.actuator_names[k].split(" (")[0].replace("_", " ") for k in part.actuators)
         assert f"| {hip}, {ankle} | {driven} |" in page
+
+
+def test_the_picture_of_the_hexapod_is_drawn_from_what_is_found_in_its_model(tmp_path: Path) -> None:
+    kept = ROOT / "docs" / "images" / "hexapod.png"
+    runpy.run_path(str(ROOT / "docs" / "draw_robot.py"))["draw"](tmp_path / "hexapod.png")
+    drawn, shown = (matplotlib.image.imread(path) for path in (tmp_path / "hexapod.png", kept))
+    assert np.abs(drawn - shown).mean() < 0.02, "python docs/draw_robot.py draws it anew"
+    assert kept.stat().st_size < 200_000
 
 
 def test_the_picture_of_the_readme_is_drawn_from_the_wiring_plans(tmp_path: Path) -> None:
