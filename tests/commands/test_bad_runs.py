@@ -84,7 +84,10 @@ OTHERS = {
     "no_champion": (lambda run: run.champion.unlink(), "champion.json: could not be read"),
     "no_json": (lambda run: run.champion.write_text("{}"), "champion.json: "),
     "other_variant": (champion_with("variant", value="random"), "expected a champion of neat, got random"),
-    "other_plan": (champion_with("plan", "observation_size", value=9), "champion.json: is wired differently"),
+    "other_plan": (
+        champion_with("plan", "modules", 0, "position", value=[1.0, 0.0]),
+        "champion.json: is wired differently",
+    ),
     "other_kind": (champion_with("feed_forward", value=True), "champion.json: "),
     "table": (lambda run: run.robustness.write_text("x"), "robustness.csv"),
 }
