@@ -10,7 +10,7 @@ import numpy as np
 
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ExneatError, check_keys, check_text
+from exneat_cli.errors import ExneatError, check_text
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
 from exneat_cli.runs import read_task
 from exneat_cli.tasks import Task
@@ -23,8 +23,7 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
-    plain = line.compose()
-    check_keys("", plain, ("run", "output", "task", "evolution", "budgets"))
+    plain = line.compose_only(("run", "output"), ("task", "evolution", "budgets", "executor", "name"))
     if "task" in plain:
         _show_task(read_task(plain["task"]))
     elif plain["run"] is not None:
