@@ -10,6 +10,7 @@ import numpy as np
 
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.jobs import name_code
 from exneat_cli.errors import ExneatError, check_text
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
 from exneat_cli.runs import read_task
@@ -25,6 +26,7 @@ def run(line: CommandLine) -> int:
     """
     plain = line.compose_only(("run", "output"), ("task", "evolution", "budgets", "executor", "name"))
     if "task" in plain:
+        name_code(line, plain)
         _show_task(read_task(plain["task"]))
     elif plain["run"] is not None:
         check_text("run", plain["run"], "a run directory")

@@ -68,6 +68,11 @@ def test_a_class_that_is_named_trains_resumes_to_the_same_bytes_and_is_evaluated
     assert main(["inspect", f"run={whole.path}"]) == 0
 
 
+def test_inspect_shows_the_parts_of_a_class_that_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", *CUSTOM]) == 0
+    assert "task corridor: 2 sensors" in capfd.readouterr().out
+
+
 def test_sensor_noise_has_levels_for_a_task_that_it_does_not_know() -> None:
     assert main(["train", *CUSTOM, *SMALL, "sweep=sensor_noise"]) == 0
     (run,) = runs_in("outputs")
