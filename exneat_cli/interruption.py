@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import importlib.util
 import os
 import signal
 import sys
@@ -32,6 +33,20 @@ def listening() -> Iterator[None]:
     finally:
         _heard, sys.unraisablehook = None, hook
         _set_handlers(before)
+
+
+def name_window_library() -> None:
+    """Say which library MuJoCo's windows need, unless the user did: else pyGLFW asks another Python for its version.
+
+    That one would complain of Ctrl-C, or that nobody reads its answer any more.
+    """
+    package = importlib.util.find_spec("glfw")
+    if package is None or package.origin is None:
+        return
+    session = os.environ.get("PYGLFW_LIBRARY_VARIANT") or os.environ.get("XDG_SESSION_TYPE", "")
+    library = Path(package.origin).parent / ("wayland" if session.lower() == "wayland" else "x11") / "libglfw.so"
+    if library.is_file():
+        os.environ.setdefault("PYGLFW_LIBRARY", str(library))
 
 
 def signal_heard() -> int | None:

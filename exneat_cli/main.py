@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listening, signal_heard
+from exneat_cli.interruption import listening, name_window_library, signal_heard
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -77,6 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     with listening():
         try:
+            name_window_library()
             if command not in COMMANDS:
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)

@@ -141,6 +141,17 @@ def test_a_program_that_is_done_ends_with_its_own_exit_code_whatever_comes_late(
     assert (done.returncode, done.stderr) == (7, "")
 
 
+def test_no_other_python_is_asked_for_the_version_of_a_library_of_windows() -> None:
+    done = in_process("""
+        started = []
+        sys.addaudithook(lambda event, about: started.append(about) if event == "subprocess.Popen" else None)
+        from exneat_cli.main import main
+        main(["inspect", "task=gym", "task.env_id=HalfCheetah-v5"])
+        print("glfw" in sys.modules, started, file=sys.stderr)
+    """)
+    assert (done.stderr, done.returncode) == ("True []\n", 0)
+
+
 WORKER = """
 try:
     with as_worker(pathlib.Path(sys.argv[1])):

@@ -27,7 +27,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
 import exneat_cli
-from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.errors import ConfigError, ExneatError, check_keys
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
@@ -64,6 +64,19 @@ class CommandLine:
             if key not in plain:
                 raise ExneatError(f"{key}: is missing")
         return {str(key): value for key, value in plain.items()}
+
+    def compose_only(self, needed: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Any]:
+        """Compose all settings, see `compose`, which must be those `needed` and may be the `optional` ones.
+
+        Raises:
+            ExneatError: as `compose`, or another key is there.
+        """
+        plain = self.compose()
+        check_keys("", plain, (*needed, *optional))
+        for key in needed:
+            if key not in plain:
+                raise ExneatError(f"{key}: is missing")
+        return plain
 
     @contextlib.contextmanager
     def composed(self) -> Iterator[DictConfig]:

@@ -20,7 +20,7 @@ from importlib import metadata
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ExneatError, check_keys, check_text
+from exneat_cli.errors import ExneatError, check_text
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -67,8 +67,7 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense.
     """
-    plain = line.compose()
-    check_keys("", plain, ("output",))
+    plain = line.compose_only(("output",))
     check_text("output", plain["output"], "a directory")
     states = []
     for name, look, worst, remedy in _checks(Path(plain["output"])):

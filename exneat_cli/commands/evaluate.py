@@ -19,8 +19,7 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: a run, a sweep or a level is unusable; nothing was run then.
     """
-    plain = line.compose()
-    check_keys("", plain, ("run", "task", "sweep", "sweeps", "executor"))
+    plain = line.compose_only(("run", "task", "sweeps"), ("sweep", "executor"))
     check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
     name_code(line, plain)
     if not plain["sweeps"]:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ExneatError, check_keys, check_text
+from exneat_cli.commands.jobs import name_code
+from exneat_cli.errors import ExneatError, check_text
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
 from exneat_cli.runs import read_task
 from exneat_cli.tasks import Task
@@ -21,9 +22,9 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
-    plain = line.compose()
-    check_keys("", plain, ("run", "output", "task", "evolution", "budgets"))
+    plain = line.compose_only(("run", "output"), ("task", "evolution", "budgets", "executor", "name"))
     if "task" in plain:
+        name_code(line, plain)
         _show_task(read_task(plain["task"]))
     elif plain["run"] is not None:
         check_text("run", plain["run"], "a run directory")

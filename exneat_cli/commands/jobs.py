@@ -129,9 +129,9 @@ def with_sweeps(name: str, settings: RunSettings, plain: Mapping[str, Any]) -> J
                 raise ExneatError(f"{key}.{part}: is missing")
         by_task, levels = check_section(f"{key}.levels", entry["levels"]), common.get("levels")
         if levels is None:
-            if task not in by_task:
+            levels = by_task.get(task, by_task.get("other"))
+            if levels is None:
                 raise ConfigError("sweep", f"a sweep that fits task={task}", sweep, f"it fits {', '.join(by_task)}")
-            levels = by_task[task]
         if not isinstance(levels, list):
             raise ConfigError("sweep.levels", "a list of numbers, e.g. [0, 0.1]", levels)
         sweeps.append(Sweep(sweep, str(entry["parameter"]), tuple(levels), str(entry["label"])))

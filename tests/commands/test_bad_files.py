@@ -163,3 +163,23 @@ def test_files_with_other_line_ends_and_letters_in_places_with_spaces_or_links_a
     assert main(["sweep", "experiment=my_experiment.yaml", *own]) == 0
     (run,) = (tmp_path / "real").glob("my_experiment-clean-smoke/*")
     assert yaml.safe_load((run / "config.yaml").read_text())["noise"] == {"sensor_std": 0.01, "reset_scale": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "named"),
+    [
+        ("inspect", "output: out", "run: is missing"),
+        ("doctor", "", "output: is missing"),
+        ("evaluate", "run: out", "task: is missing"),
+        ("evaluate", "{run: out, task: {}}", "sweeps: is missing"),
+        ("report", "output: out", "experiment: is missing"),
+        ("sweep", "budget: smoke", "experiment: is missing"),
+        ("train", "output: out", "task: expected a section"),
+        ("inspect", "runs: out", "runs: unknown key (value 'out')"),
+    ],
+)
+def test_a_configuration_of_a_users_own_that_lacks_a_key_is_refused(
+    command: str, text: str, named: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.yaml").write_text(text)
+    check_refusal([command, "-cp", str(tmp_path), "-cn", "mine"], [named], tmp_path, capfd)

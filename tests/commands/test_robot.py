@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.main import main
+from exneat_cli.records import read_champion, read_robustness
 from tests.commands.refusals import check_refusal
 
 LEG = """
@@ -60,6 +61,15 @@ def test_a_model_that_cannot_be_used_is_refused_before_anything_is_made(
         ("task.model=ant wiring.trunk=shared wiring.central=true", "wiring.trunk"),
         ("task.model=walker2d geometry=fb", "geometry: expected parts that all stand in front or behind"),
         ("task.model=hexapod task.control_period=0.013", "task.control_period: expected a multiple"),
+        ("task.model=hexapod task.control_period=0", "task.control_period: expected a multiple"),
+        ("task.model=hexapod task.control_period=x", "task.control_period: expected a number from 0 to 10, got 'x'"),
+        ("task.model=hexapod task.control_period=1e300", "task.control_period: expected a number from 0 to 10"),
+        ("task.model=null", "task.model: expected an MJCF file, or the name of a model, got None"),
+        ("task.model=hexapod task.parts=[1]", "task.parts: expected a section"),
+        ("task.model=hexapod task.parts={a:[]}", "task.parts.a: expected a list of names of bodies, e.g. [thigh], got"),
+        ("task.model=hexapod task.parts={a:front_left}", "task.parts.a: expected a list of names of bodies"),
+        ("task.model=hexapod task.parts={a:[3]}", "task.parts.a: expected a list of names of bodies"),
+        ("task.model=hopper task.symmetry=mirror", "task.symmetry: expected null, as this body is built, got 'mirror'"),
         ("task=hunting wiring.trunk=shared", "wiring.trunk: expected none"),
         ("task=hunting geometry=auto", "geometry: expected single, all or custom"),
     ],
@@ -88,6 +98,27 @@ def test_a_model_of_ones_own_is_kept_with_its_run_and_may_not_change_in_between(
     (tmp_path / "dog.xml").unlink()
     assert main(["evaluate", f"run={run}", "sweep=reset_noise", "sweep.levels=[0.0]", "sweep.episodes=1"]) == 0
     assert (run / "robustness.csv").exists()
+
+
+@pytest.mark.parametrize("model", ["hexapod", "half_cheetah"])
+def test_noise_on_sensors_and_poses_changes_a_robots_test_from_the_unperturbed_one_on(
+    model: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["train", *COMMON, f"task.model={model}"]) == 0
+    (run,) = (tmp_path / "outputs" / "robot").iterdir()
+    for sweep in ("sensor_noise", "reset_noise"):
+        levels = ["sweep.levels=[0.0,0.1,0.3]", "sweep.episodes=2"]
+        assert main(["evaluate", f"run={run}", f"sweep={sweep}", *levels]) == 0
+    rows = read_robustness(run / "robustness.csv")
+    scores = {(row.parameter, row.level): (row.fitness_mean, row.fitness_std) for row in rows}
+    test = read_champion(run / "champion.json").scores.test
+    assert test.episodes == 2
+    assert [level for level, score in scores.items() if score == (test.fitness_mean, test.fitness_std)] == [
+        ("reset_noise", 0.1),  # the model's own
+        ("sensor_noise", 0.0),
+    ]
+    assert len(set(scores.values())) == 5
 
 
 def test_inspect_shows_parts_and_geometries_before_any_run(

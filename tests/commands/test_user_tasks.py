@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.main import main
-from exneat_cli.records import RunDirectory, read_yaml
+from exneat_cli.records import RunDirectory, read_robustness, read_yaml
 from tests.commands.refusals import check_refusal
 from tests.commands.user_modules import CORRIDOR, EXAMPLE, MARK, forget_user_code
 
@@ -66,6 +66,18 @@ def test_a_class_that_is_named_trains_resumes_to_the_same_bytes_and_is_evaluated
     assert main(["evaluate", f"run={whole.path}", *SWEEP, "task.kind=walks:Corridor"]) == 0
     assert len(whole.robustness.read_text(encoding="utf-8").splitlines()) == 3
     assert main(["inspect", f"run={whole.path}"]) == 0
+
+
+def test_inspect_shows_the_parts_of_a_class_that_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", *CUSTOM]) == 0
+    assert "task corridor: 2 sensors" in capfd.readouterr().out
+
+
+def test_sensor_noise_has_levels_for_a_task_that_it_does_not_know() -> None:
+    assert main(["train", *CUSTOM, *SMALL, "sweep=sensor_noise"]) == 0
+    (run,) = runs_in("outputs")
+    levels = [row.level for row in read_robustness(run.robustness) if row.parameter == "sensor_noise"]
+    assert levels == [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]
 
 
 def test_a_file_of_the_users_may_name_the_class_and_a_multirun_varies_it(capfd: pytest.CaptureFixture[str]) -> None:

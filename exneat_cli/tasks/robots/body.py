@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from exneat_cli.errors import ConfigError
+from exneat_cli.errors import ConfigError, check_section
 from exneat_cli.tasks.robots.likeness import MIRROR, Pose, Relation, relate
 
 SYMMETRIES = ("turn", "mirror")
@@ -77,7 +77,8 @@ def take_apart(
         by_place: call parts by where they stand, though their first bodies have names of their own.
 
     Raises:
-        ConfigError: the model has no root, no actuators or ones of another kind than joints', or `parts` do not fit it.
+        ConfigError: the model has no root, no actuators or ones of another kind than joints', or `parts` or `symmetry`
+            do not fit it.
     """
     trunk, root = find_root(model)
     pose = Pose(model, trunk)
@@ -89,6 +90,9 @@ def take_apart(
     names = _unique_names(names, pose, bodies)
     turns = {(a, b): r for a in bodies for b in bodies if (r := _turn(pose, a, b, bodies))}
     mirrorings = {(a, b): r for a in bodies for b in bodies if a != b and (r := relate(pose, "mirror", MIRROR, a, b))}
+    there = tuple(name for name, found in zip(SYMMETRIES, (turns, mirrorings), strict=True) if found)
+    if symmetry is not None and symmetry not in there:
+        raise ConfigError("task.symmetry", f"{' or '.join((*there, 'null'))}, as this body is built", symmetry)
     moves = turns if symmetry == "turn" or not mirrorings else {}
     limbs: list[Limb] = []
     references: list[tuple[int, ...]] = []
@@ -104,7 +108,6 @@ def take_apart(
         limbs.append(Limb(name, likeness, [*ways, None][likeness] or _itself(pose, part), (x, y, z)))
     in_parts = {body for part in bodies for body in part}
     core = tuple(body for body in subtree(model, trunk) if body not in in_parts)
-    there = tuple(name for name, found in zip(SYMMETRIES, (turns, mirrorings), strict=True) if found)
     return Body(trunk, root, core, tuple(limbs), there)
 
 
@@ -186,13 +189,18 @@ def _outermost(pose: Pose, trunk: int) -> list[int]:
     return outermost
 
 
+def check_parts(parts: object) -> None:
+    """Refuse parts that do not name their bodies with a `ConfigError`; None is no choice."""
+    for name, bodies in check_section("task.parts", {} if parts is None else parts).items():
+        if not isinstance(bodies, list | tuple) or not bodies or not all(isinstance(body, str) for body in bodies):
+            raise ConfigError(f"task.parts.{name}", "a list of names of bodies, e.g. [thigh]", bodies)
+
+
 def _named_parts(model: mujoco.MjModel, trunk: int, parts: Mapping[str, Sequence[str]]) -> dict[tuple[int, ...], str]:
     known = {model.body(body).name: body for body in subtree(model, trunk)[1:]}
     named: dict[tuple[int, ...], str] = {}
     taken: dict[int, str] = {}
     for name, roots in parts.items():
-        if not roots:
-            raise ConfigError(f"task.parts.{name}", "the names of one or more bodies", "none")
         bodies: list[int] = []
         for root in roots:
             if root not in known:

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 _PLACES = 1e-3
 """Of the model's extent: places nearer to each other than this are the same, and so are directions (as sines)."""
 _SHARE = 0.2
-"""Masses, damping, friction loss and armature may differ by this share of the larger one, stiffness by this share of
-the body's largest: the armature of Humanoid's hips differs by 20%, and one of its knees has a spring of 1 N m/rad, the
-other none, beside hips of 20."""
+"""Masses, moments of inertia about any axis, damping, friction loss and armature may differ by this share of the
+larger one, stiffness by this share of the body's largest: the armature of Humanoid's hips differs by 20%, and one of
+its knees has a spring of 1 N m/rad, the other none, beside hips of 20."""
 _ROUND_OFF = 1e-6
 """Relative tolerance of what must be equal: ranges, gears, sizes, friction."""
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -55,7 +55,7 @@ class Relation(NamedTuple):
 
 
 class Pose:
-    """Where a model's bodies, joints and geoms are in its initial pose, in the axes of its trunk, in metres."""
+    """Where a model's bodies, joints and geoms are in its initial pose, in its trunk's axes, in m and kg m^2."""
 
     def __init__(self, model: mujoco.MjModel, trunk: int) -> None:
         data = mujoco.MjData(model)
@@ -65,6 +65,9 @@ class Pose:
         self.height = float(origin[2])
         self.tolerance = _PLACES * float(model.stat.extent)
         self.bodies = (data.xpos - origin) @ axes
+        self.mass_centres = (data.xipos - origin) @ axes
+        principal = axes.T @ data.ximat.reshape(-1, 3, 3)
+        self.inertias = (principal * model.body_inertia[:, None]) @ principal.transpose(0, 2, 1)
         self.anchors = (data.xanchor - origin) @ axes
         self.axes = data.xaxis @ axes
         self.geoms = (data.geom_xpos - origin) @ axes
@@ -145,9 +148,12 @@ class _Comparison(NamedTuple):
         return bool(np.abs(self.move @ one + self.shift - other).max() <= self.pose.tolerance)
 
     def same_body(self, one: int, other: int) -> bool:
-        model = self.pose.model
-        alike = self.same_place(self.pose.bodies[one], self.pose.bodies[other]) and _near(
-            *model.body_mass[[one, other]]
+        pose = self.pose
+        alike = (
+            self.same_place(pose.bodies[one], pose.bodies[other])
+            and self.same_place(pose.mass_centres[one], pose.mass_centres[other])
+            and _near(*pose.model.body_mass[[one, other]])
+            and _near_about_any_axis(self.move @ pose.inertias[one] @ self.move.T, pose.inertias[other])
         )
         geoms, left = self.pose.geoms_of(one), list(self.pose.geoms_of(other))
         for geom in geoms:
@@ -225,3 +231,9 @@ def _equal(one: Any, other: Any) -> bool:
 def _near(one: float, other: float, largest: float = 0.0) -> bool:
     """Whether two positive numbers differ little, beside the larger of them or one that is larger still."""
     return bool(abs(one - other) <= _SHARE * max(one, other, largest) + 1e-12)
+
+
+def _near_about_any_axis(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """The same for (3, 3) inertias: for the moments u' I u of both, about all directions u."""
+    least = [np.linalg.eigvalsh(a - (1.0 - _SHARE) * b)[0] for a, b in ((one, other), (other, one))]
+    return bool(min(least) >= -1e-6 * max(np.trace(one), np.trace(other)))

@@ -5,11 +5,12 @@ Rules of names are those of Gymnasium's v5 environments (Farama Foundation, 2024
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -132,11 +133,49 @@ def _shipped(model: str) -> Path:
     )
 
 
-def _state(model: str) -> tuple[Path, int, int]:
-    """What tells one content of a model's file from another: a program may run for long, and files change."""
-    path = path_of(model).resolve()
-    found = path.stat()
-    return path, found.st_mtime_ns, found.st_size
+_Stamp = tuple[int, int] | None
+_seen: dict[Path, dict[Path, _Stamp]] = {}
+"""All files of each model that was read, by its main one, and what tells their contents from others."""
+
+
+def _state(model: str) -> tuple[Path, tuple[tuple[Path, _Stamp], ...]]:
+    """The model's file, and all of its files as they are now: a program may run for long, and files change."""
+    main = path_of(model).resolve()
+    if any(_stamp(path) != stamp for path, stamp in _seen.get(main, {main: None}).items()):
+        _seen[main] = {path: _stamp(path) for path in _paths(main)}
+    return main, tuple(_seen[main].items())
+
+
+def _stamp(path: Path) -> _Stamp:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
+
+
+def _paths(main: Path) -> list[Path]:
+    """The file and all that it includes.
+
+    Raises:
+        ConfigError: one of them is missing or cannot be read, it is no MJCF, or they are too large.
+    """
+    with _reading(main):
+        _refuse_large([main])
+        paths = [main, *(Path(os.path.normpath(name)) for name in mujoco.mju_getXMLDependencies(str(main)))]
+        _refuse_large(paths)
+    return sorted(set(paths))
+
+
+@contextlib.contextmanager
+def _reading(main: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        came = f"{error.filename}: {error.strerror}"
+        raise ConfigError("task.model", "a model whose files can all be read", came) from error
+    except mujoco.FatalError as error:
+        raise ConfigError("task.model", "an MJCF file", f"{main.name}: {error}") from error
 
 
 def files_of(model: str) -> dict[str, bytes]:
@@ -149,18 +188,11 @@ def files_of(model: str) -> dict[str, bytes]:
 
 
 @functools.lru_cache(maxsize=16)
-def _files(main: Path, *_: int) -> dict[str, bytes]:
-    try:
-        _refuse_large([main])
-        paths = [main, *(Path(os.path.normpath(name)) for name in mujoco.mju_getXMLDependencies(str(main)))]
-        _refuse_large(paths)
-        common = Path(os.path.commonpath([path.parent for path in paths]))
-        return {str(path.relative_to(common)): path.read_bytes() for path in sorted(set(paths))}
-    except OSError as error:
-        came = f"{error.filename}: {error.strerror}"
-        raise ConfigError("task.model", "a model whose files can all be read", came) from error
-    except mujoco.FatalError as error:
-        raise ConfigError("task.model", "an MJCF file", f"{main.name}: {error}") from error
+def _files(main: Path, state: tuple[tuple[Path, _Stamp], ...]) -> dict[str, bytes]:
+    paths = [path for path, _ in state]
+    common = Path(os.path.commonpath([path.parent for path in paths]))
+    with _reading(main):
+        return {str(path.relative_to(common)): path.read_bytes() for path in paths}
 
 
 def _refuse_large(paths: Iterable[Path]) -> None:
@@ -177,7 +209,7 @@ def digest_of(model: str) -> str:
 
 
 def load(model: str) -> mujoco.MjModel:
-    """The compiled model, the same object as long as its file does not change.
+    """The compiled model, the same object as long as none of its files changes.
 
     Raises:
         ConfigError: its files cannot be used, see `files_of`, or MuJoCo refuses them.
@@ -186,8 +218,7 @@ def load(model: str) -> mujoco.MjModel:
 
 
 @functools.lru_cache(maxsize=16)
-def _load(path: Path, *state: int) -> mujoco.MjModel:
-    _files(path, *state)
+def _load(path: Path, _: tuple[tuple[Path, _Stamp], ...]) -> mujoco.MjModel:
     mujoco.set_mju_user_warning(lambda message: None)  # else MuJoCo writes MUJOCO_LOG.TXT
     try:
         return mujoco.MjModel.from_xml_path(str(path))

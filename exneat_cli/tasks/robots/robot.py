@@ -19,9 +19,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_text, check_whole
 from exneat_cli.tasks.robots import dynamics
-from exneat_cli.tasks.robots.body import SYMMETRIES, Body, take_apart
+from exneat_cli.tasks.robots.body import SYMMETRIES, Body, check_parts, take_apart
 from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
@@ -33,6 +33,8 @@ THESIS_CONTROL_WEIGHT = 0.01
 steps, which leaves room for 0.01 (Zhang, 2025, table 5.5); Gymnasium's default for Ant is 0.5."""
 FORCE_LIMIT = 1.0
 """Contact forces (N) and torques (N m) are clipped to this, as in Gymnasium's Ant-v5."""
+LONGEST_PERIOD = 10.0
+"""Seconds that a control step may last."""
 HEALTHY_SHARES = (0.4, 2.0)
 """Of the trunk's initial height: the healthy range of a model without rules of its own."""
 
@@ -49,7 +51,7 @@ class RobotTask(Task):
         symmetry: ``turn`` or ``mirror``, what relates alike parts; None follows from the geometry.
         contact_forces: whether contact forces are sensed.
         part_bodies: names of each part's bodies, by the part's name; None finds the parts.
-        control_period: seconds per control step, None for the model's own.
+        control_period: seconds per control step, at most 10, None for the model's own.
         reward: weights of the full reward, ``gymnasium`` or ``thesis`` (with less cost of effort).
         max_steps: control steps after which an episode ends.
         progress: metres along x that count as progress, in training only.
@@ -85,6 +87,10 @@ class RobotTask(Task):
         if self.symmetry is not None:
             check_choice("task.symmetry", self.symmetry, list(SYMMETRIES))
         check_flag("task.contact_forces", self.contact_forces)
+        check_text("task.model", self.model, "an MJCF file, or the name of a model")
+        check_parts(self.part_bodies)
+        if self.control_period is not None:
+            check_real("task.control_period", self.control_period, 0.0, LONGEST_PERIOD)
         check_choice("task.reward", self.reward, list(REWARDS))
         check_whole("task.max_steps", self.max_steps, 1, 1_000_000)
         check_real("task.progress", self.progress, 0.0)
@@ -233,8 +239,7 @@ class RobotTask(Task):
         }
 
     def _scoring(self, model: mujoco.MjModel) -> dict[str, Any]:
-        rules = rules_of(self.model)
-        body, readings, sensing = self._anatomy
+        rules, (body, readings, sensing) = rules_of(self.model), self._anatomy
         frames = sensing.frames
         slide = int(model.jnt_qposadr[body.root[0]])
         height = int(readings.positions[frames.height]) if frames.height >= 0 else -1
@@ -265,7 +270,7 @@ class RobotTask(Task):
 
     @property
     def _substeps(self) -> int:
-        period = self.control_period or rules_of(self.model).control_period
+        period = rules_of(self.model).control_period if self.control_period is None else self.control_period
         timestep = float(load(self.model).opt.timestep)
         substeps = max(1, round(period / timestep))
         if abs(substeps * timestep - period) > 1e-9:
