@@ -36,10 +36,17 @@ def run(line: CommandLine) -> int:
     own = None if asked["experiment"] is None else read_experiment(asked["experiment"])
     artefacts = _artefacts(asked, own)
     names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})
-    studies = {name: _study(asked["experiment"] if own and own.name == name else name, asked, line) for name in names}
+    sources = {name: asked["experiment"] if own and own.name == name else name for name in names}
+    experiments = {name: read_experiment(source) for name, source in sources.items()}
+    budgets = {name: asked["budget"] or _largest_budget(experiments[name], asked["output"]) for name in names}
+    commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
+    lacking = ExneatError(f"output={asked['output']}: no finished run of {', '.join(names)}\n  {commands[names[0]]}")
+    # Planning composes every variant and condition, which takes seconds: first see whether there is anything at all.
+    if not any(_has_finished(experiments[name], budgets[name], asked["output"]) for name in names):
+        raise lacking
+    studies = {name: _study(experiments[name], budgets[name], commands[name], line) for name in names}
     if not any(study.finished for study in studies.values()):
-        where = f"output={asked['output']}: no finished run of {', '.join(names)}"
-        raise ExneatError(f"{where}\n  {next(iter(studies.values())).command}")
+        raise lacking
     directory = Path(asked["output"]) / "report" / (own.name if own else "")
     built: list[Built] = []
     missing: dict[str, str] = {}
@@ -91,25 +98,28 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
     return [part.experiment for part in (artefact.panels if isinstance(artefact, FigurePlan) else artefact.rows)]
 
 
-def _study(source: str, asked: Mapping[str, Any], line: CommandLine) -> Study:
-    """The runs of an experiment, which is a name or a YAML file, and the command that does what is missing."""
-    experiment = read_experiment(source)
-    budget = asked["budget"] or _largest_budget(experiment, asked["output"])
+def _command(source: str, budget: str, asked: Mapping[str, Any], line: CommandLine) -> str:
+    """The command that does what is missing of an experiment, which is a name or a YAML file."""
+    places = [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
+    others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
+    return shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *places, *others])
+
+
+def _study(experiment: Experiment, budget: str, command: str, line: CommandLine) -> Study:
+    """The runs of an experiment."""
     jobs = plan_jobs(experiment, budget, line, _OWN)
     task = jobs[0].settings.task
     runs = {}
     for job in jobs:
         (condition, variant, _), settings = job.name.split("/"), job.settings
         runs[PlannedRun(condition, variant, settings.seed, settings.directory, settings.trained_generations)] = job
-    places = [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
-    others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
     swept = [job for job in jobs if job.sweeps]
     sweeps = {sweep.name: sweep for job in swept for sweep in job.sweeps}
     return Study(
         experiment=experiment.name,
         budget=budget,
         claim=experiment.claim,
-        command=shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *places, *others]),
+        command=command,
         fitness_name=task.fitness_name,
         has_full_reward=isinstance(task, HasFullReward),
         variants={name: variant.label for name, variant in experiment.variants.items()},
@@ -123,9 +133,12 @@ def _study(source: str, asked: Mapping[str, Any], line: CommandLine) -> Study:
 
 
 def _largest_budget(experiment: Experiment, output: str) -> str:
-    for budget in BUDGETS:
-        for condition in experiment.conditions:
-            folder = Path(output) / f"{experiment.name}-{condition}-{budget}"
-            if any(RunDirectory(path.parent).is_finished() for path in folder.glob("*/manifest.json")):
-                return budget
-    return next(budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
+    finished = (budget for budget in BUDGETS if _has_finished(experiment, budget, output))
+    planned = (budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
+    return next(finished, None) or next(planned)
+
+
+def _has_finished(experiment: Experiment, budget: str, output: str) -> bool:
+    folders = [Path(output) / f"{experiment.name}-{condition}-{budget}" for condition in experiment.conditions]
+    manifests = (path for folder in folders for path in folder.glob("*/manifest.json"))
+    return any(RunDirectory(path.parent).is_finished() for path in manifests)

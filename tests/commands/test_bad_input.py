@@ -274,9 +274,15 @@ def test_a_bad_job_of_a_multirun_leaves_the_others_alone(tmp_path: Path, capfd: 
     [("runs [1] (é)", "runs [1] (é)"), ("'3'", "3"), ("~/x", "home/x"), ("'~'", "~"), ("it's", "it's")],
 )
 def test_a_value_means_the_same_in_every_command_whatever_its_characters(
-    output: str, place: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    output: str,
+    place: str,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path_factory.mktemp("fonts")))  # whoever imports matplotlib first
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     assert main(["train", "task=track_maze", "algorithm=motionless", "budget=smoke", f"output={output}"]) == 0
