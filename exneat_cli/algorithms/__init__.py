@@ -2,7 +2,8 @@
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
 from exneat_cli.algorithms.baselines import BASELINES, Baseline
-from exneat_cli.algorithms.exneat import NEAT, PAIRINGS, Coevolution, ExNEAT
+from exneat_cli.algorithms.candidates import CHAMPIONS
+from exneat_cli.algorithms.exneat import JUDGINGS, NEAT, PAIRINGS, Coevolution, ExNEAT
 from exneat_cli.algorithms.neat.conversion import from_stock, pack_teams, to_stock, unpack_teams
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome

@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from exneat_cli.algorithms import Candidate, Coevolution, EvolutionSettings, Team, from_stock, neat_config, to_stock
-from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties, with_candidate
+from exneat_cli.algorithms.candidates import with_candidate
+from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties
 from exneat_cli.seeding import stream
 from tests.algorithms.problems import contents, problem_of, synthetic, tell
 

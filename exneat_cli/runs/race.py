@@ -1,0 +1,48 @@
+"""Who of several teams is the best on validation episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from exneat_cli.brains import Brains
+from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.seeding import EpisodeSeeds
+
+FIRST_ROUND = 2
+"""Episodes of every team in the first round of a race."""
+
+
+def race(
+    runner: Runner, brains: Sequence[Brains], episodes: Sequence[EpisodeSeeds], first: int = FIRST_ROUND
+) -> tuple[int, list[Outcomes]]:
+    """Let brains race by successive halving: the better half of a round goes on with twice as many episodes.
+
+    Few episodes are enough to drop the worst ones, and the last ones get them all. Source: Karnin, Koren and Somekh,
+    "Almost optimal exploration in multi-armed bandits", ICML 2013.
+
+    Args:
+        runner: of the episodes.
+        brains: of one team each, at least one.
+        episodes: the same for all of them; who runs in a round runs the next ones in this order.
+        first: episodes of the first round; as many as there are make one round for all.
+
+    Returns:
+        The index of the best mean, of equals the first one, and what every brain got until it was dropped.
+    """
+    got: list[list[Outcomes]] = [[] for _ in brains]
+    running, done, to = list(range(len(brains))), 0, min(first, len(episodes))
+    while True:
+        outcomes = runner.run([brains[k] for k in running], episodes[done:to])
+        for row, k in enumerate(running):
+            got[k].append(Outcomes(*(field[row : row + 1] for field in outcomes[:4])))
+        running.sort(key=lambda k: (-float(np.concatenate([each.fitness for each in got[k]], axis=1).mean()), k))
+        if to == len(episodes):
+            break
+        running = sorted(running[: (len(running) + 1) // 2])
+        done, to = to, min(2 * to, len(episodes))
+    return running[0], [
+        Outcomes(*(np.concatenate(fields, axis=1) for fields in zip(*(each[:4] for each in parts), strict=True)))
+        for parts in got
+    ]
