@@ -58,7 +58,7 @@ class Problem:
         evolution: how genomes begin, change and compete.
         population: teams per generation.
         episodes: of each team and generation.
-        pairing: ``rank`` or ``index``, how subpopulations form teams.
+        pairing: ``rank``, ``parents`` or ``index``, how subpopulations form teams.
         seed: root of all random streams.
         judging: ``last`` or ``mean``, which episodes of a team that survives count.
         champion: ``thesis`` or ``race``, which teams are candidates.

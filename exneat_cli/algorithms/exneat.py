@@ -29,9 +29,10 @@ from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
 from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
 
-PAIRINGS = ("rank", "index")
-"""``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together;
-``index`` pairs in neat-python's own order."""
+PAIRINGS = ("rank", "parents", "index")
+"""``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together, and
+offspring at random; with ``parents`` they meet offspring of genomes that were a team, as far as there are any; ``index``
+pairs in neat-python's own order."""
 JUDGINGS = ("last", "mean")
 """Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
 SECOND_LOOKS = 1 / 6
@@ -112,6 +113,8 @@ class Coevolution(Search):
             self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
             for index, subpopulation in enumerate(self._subpopulations)
         ]
+        if self._problem.pairing == "parents":
+            orders = self._with_siblings(orders, ranked)
         self._teams, self._fitness = [self._team(ids) for ids in zip(*orders, strict=True)], []
         known = self._records if self._by_mean else {}
         self._records = {team.ids: known.get(team.ids, Record()) for team in self._teams}
@@ -165,6 +168,28 @@ class Coevolution(Search):
         shuffled = [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
         return [key for key in ranked if key in there] + shuffled
 
+    def _with_siblings(self, orders: list[list[int]], ranked: list[tuple[int, ...]]) -> list[list[int]]:
+        """The same orders, but for offspring of later subpopulations, which move to where the first has siblings.
+
+        Siblings are genomes whose first parents were one team; survivors stay where they are.
+        """
+        teams = [{ids[index]: k for k, ids in enumerate(ranked)} for index in range(len(orders))]
+        lines = [
+            {key: own[parent] for key, parent in subpopulation.first_parents.items()}
+            for own, subpopulation in zip(teams, self._subpopulations, strict=True)
+        ]
+        wanted = [lines[0].get(key) for key in orders[0]]
+        for index, order in enumerate(orders[1:], start=1):
+            offspring = [key for key in order if key not in teams[index]]
+            first = len(order) - len(offspring)
+            waiting: dict[int | None, list[int]] = {}
+            for key in offspring:
+                waiting.setdefault(lines[index].get(key), []).append(key)
+            placed = [waiting[line].pop(0) if waiting.get(line) else None for line in wanted[first:]]
+            others = iter([key for key in offspring if key not in placed])
+            orders[index] = order[:first] + [next(others) if key is None else key for key in placed]
+        return orders
+
     def _team(self, ids: tuple[int, ...]) -> Team:
         return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
 
@@ -179,7 +204,7 @@ class Coevolution(Search):
         """
         species = sum(subpopulation.species_count for subpopulation in self._subpopulations)
         columns: dict[str, int | float] = {"species": species, "extinctions": self._extinctions}
-        if self._by_mean:
+        if self._by_mean and self._fitness:
             columns["judged_fitness"] = max(self._fitness)
         powers = [genome.power for team in self._teams for genome in team.genomes if genome.power is not None]
         return columns | ({"mutate_power": float(np.mean(powers))} if powers else {})

@@ -16,6 +16,9 @@ from exneat_cli.runs import read_task
 from exneat_cli.tasks import Task
 from exneat_cli.wiring import GEOMETRIES, Geometry, Module
 
+_WITH_TASKS = ("task", "algorithm", "linkage", "evolution", "recipe", "wiring", "judging", "champion", "budgets")
+"""What a task's file and its recipe set; of all that, only the task is shown."""
+
 
 def run(line: CommandLine) -> int:
     """Print the wiring of ``run=<directory>``, the parts of ``task=<name>``, or the runs below ``output=<directory>``.
@@ -24,7 +27,7 @@ def run(line: CommandLine) -> int:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
     plain = line.compose()
-    check_keys("", plain, ("run", "output", "task", "evolution", "budgets"))
+    check_keys("", plain, ("run", "output", *_WITH_TASKS))
     if "task" in plain:
         _show_task(read_task(plain["task"]))
     elif plain["run"] is not None:

@@ -59,7 +59,7 @@ class RunSettings:
         seed: root of all random streams but those of validation and test.
         generations, population: of each subpopulation.
         episodes: training episodes per team and generation.
-        pairing: ``rank`` or ``index``.
+        pairing: ``rank``, ``parents`` or ``index``.
         judging: ``last`` or ``mean``: a team that survives competes by its mean over the episodes of one generation, or
             over all that it ever had; then the best get a second look, at the expense of new teams.
         champion: ``race`` or ``thesis``, how the champion is chosen.

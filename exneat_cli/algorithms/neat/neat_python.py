@@ -105,6 +105,7 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
     def __init__(self, config: Any, reporters: ReporterSet, stagnation: Any) -> None:
         super().__init__(config, reporters, stagnation)
         self.genome_indexer = counter(1)
+        self.first_parents: dict[int, int] = {}  # of the offspring that were made last
 
     def create_new(self, genome_type: Any, genome_config: Any, num_genomes: int) -> dict[int, Any]:
         """Initial genomes by id, in which the initial hidden nodes have the same keys.
@@ -144,6 +145,7 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
             genomes: dict[int, Any] = super().reproduce(config, species, pop_size, generation)
         finally:
             configured.elitism, configured.min_species_size = elitism, min_species_size
+        self.first_parents = {key: parents[0] for key, parents in self.ancestors.items() if parents}
         # neat-python keeps every genome's parents for ever, and asks for none of them.
         self.ancestors.clear()
         return genomes

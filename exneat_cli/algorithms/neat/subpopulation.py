@@ -68,6 +68,11 @@ class Subpopulation:
         """Number of species in the current generation."""
         return len(self._species.species)
 
+    @property
+    def first_parents(self) -> dict[int, int]:
+        """Of each of the last generation's offspring, by id, the id of the first parent."""
+        return self._reproduction.first_parents
+
     def in_arrays(self, key: int) -> ArrayGenome:
         """The genome with this id, whatever the configuration's class is."""
         genome: ArrayGenome = self.genomes[key] if self._in_arrays else from_stock(self.genomes[key])
