@@ -31,8 +31,8 @@ from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
 
 PAIRINGS = ("rank", "parents", "index")
 """``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together, and
-offspring at random; with ``parents`` they meet offspring of genomes that were a team, as far as there are any; ``index``
-pairs in neat-python's own order."""
+offspring at random; with ``parents`` they meet offspring of genomes that were a team, as far as there are any;
+``index`` pairs in neat-python's own order."""
 JUDGINGS = ("last", "mean")
 """Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
 SECOND_LOOKS = 1 / 6
