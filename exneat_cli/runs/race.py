@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from exneat_cli.seeding import EpisodeSeeds
 
 FIRST_ROUND = 2
 """Episodes of every team in the first round of a race."""
+
+_FIGURES: Any = ("fitness", "full_reward", "steps", "failed")
 
 
 def race(
@@ -36,13 +39,15 @@ def race(
     while True:
         outcomes = runner.run([brains[k] for k in running], episodes[done:to])
         for row, k in enumerate(running):
-            got[k].append(Outcomes(*(field[row : row + 1] for field in outcomes[:4])))
-        running.sort(key=lambda k: (-float(np.concatenate([each.fitness for each in got[k]], axis=1).mean()), k))
+            got[k].append(Outcomes(*(getattr(outcomes, name)[row : row + 1] for name in _FIGURES)))
+        running.sort(key=lambda k: (-float(_joined(got[k]).fitness.mean()), k))
         if to == len(episodes):
             break
         running = sorted(running[: (len(running) + 1) // 2])
         done, to = to, min(2 * to, len(episodes))
-    return running[0], [
-        Outcomes(*(np.concatenate(fields, axis=1) for fields in zip(*(each[:4] for each in parts), strict=True)))
-        for parts in got
-    ]
+    return running[0], [_joined(parts) for parts in got]
+
+
+def _joined(parts: Sequence[Outcomes]) -> Outcomes:
+    """All episodes of one brain."""
+    return Outcomes(*(np.concatenate([getattr(each, name) for each in parts], axis=1) for name in _FIGURES))
