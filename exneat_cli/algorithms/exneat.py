@@ -24,15 +24,12 @@ from exneat_cli.algorithms.neat.conversion import Columns, pack_teams, unpack_te
 from exneat_cli.algorithms.neat.neat_python import neat_config
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
+from exneat_cli.algorithms.pairing import by_rank, with_siblings
 from exneat_cli.errors import check_choice
 from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
 from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
 
-PAIRINGS = ("rank", "parents", "index")
-"""``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together, and
-offspring at random; with ``parents`` they meet offspring of genomes that were a team, as far as there are any;
-``index`` pairs in neat-python's own order."""
 JUDGINGS = ("last", "mean")
 """Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
 SECOND_LOOKS = 1 / 6
@@ -109,12 +106,11 @@ class Coevolution(Search):
             for index, subpopulation in enumerate(self._subpopulations):
                 fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
                 self._extinctions += subpopulation.advance(fitness)
-        orders = [
-            self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
-            for index, subpopulation in enumerate(self._subpopulations)
-        ]
+        orders = [list(subpopulation.genomes) for subpopulation in self._subpopulations]
+        if self._problem.pairing != "index":
+            orders = by_rank(orders, ranked, self._pairing_rng)
         if self._problem.pairing == "parents":
-            orders = self._with_siblings(orders, ranked)
+            orders = with_siblings(orders, ranked, [each.first_parents for each in self._subpopulations])
         self._teams, self._fitness = [self._team(ids) for ids in zip(*orders, strict=True)], []
         known = self._records if self._by_mean else {}
         self._records = {team.ids: known.get(team.ids, Record()) for team in self._teams}
@@ -158,37 +154,6 @@ class Coevolution(Search):
             return
         for candidate in offered:
             self._hall_of_fame = with_candidate(self._hall_of_fame, candidate)
-
-    def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
-        """One subpopulation's `ids` as teams take them: survivors in the order of `ranked`, then offspring shuffled."""
-        if self._problem.pairing == "index":
-            return ids
-        there, before = set(ids), set(ranked)
-        offspring = [key for key in ids if key not in before]
-        shuffled = [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
-        return [key for key in ranked if key in there] + shuffled
-
-    def _with_siblings(self, orders: list[list[int]], ranked: list[tuple[int, ...]]) -> list[list[int]]:
-        """The same orders, but for offspring of later subpopulations, which move to where the first has siblings.
-
-        Siblings are genomes whose first parents were one team; survivors stay where they are.
-        """
-        teams = [{ids[index]: k for k, ids in enumerate(ranked)} for index in range(len(orders))]
-        lines = [
-            {key: own[parent] for key, parent in subpopulation.first_parents.items()}
-            for own, subpopulation in zip(teams, self._subpopulations, strict=True)
-        ]
-        wanted = [lines[0].get(key) for key in orders[0]]
-        for index, order in enumerate(orders[1:], start=1):
-            offspring = [key for key in order if key not in teams[index]]
-            first = len(order) - len(offspring)
-            waiting: dict[int | None, list[int]] = {}
-            for key in offspring:
-                waiting.setdefault(lines[index].get(key), []).append(key)
-            placed = [waiting[line].pop(0) if waiting.get(line) else None for line in wanted[first:]]
-            others = iter([key for key in offspring if key not in placed])
-            orders[index] = order[:first] + [next(others) if key is None else key for key in placed]
-        return orders
 
     def _team(self, ids: tuple[int, ...]) -> Team:
         return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
