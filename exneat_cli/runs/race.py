@@ -50,4 +50,5 @@ def race(
 
 def _joined(parts: Sequence[Outcomes]) -> Outcomes:
     """All episodes of one brain."""
-    return Outcomes(*(np.concatenate([getattr(each, name) for each in parts], axis=1) for name in _FIGURES))
+    figures: Any = [np.concatenate([getattr(each, name) for each in parts], axis=1) for name in _FIGURES]
+    return Outcomes(*figures)
