@@ -10,8 +10,8 @@ import sys
 
 import numpy as np
 
-ACTIVATIONS = {"tanh": lambda z: np.tanh(2.5 * z), "relu": lambda z: max(z, 0.0), "identity": lambda z: z}
-ACTIVATIONS["sigmoid"] = lambda z: 1.0 / (1.0 + np.exp(-np.clip(5.0 * z, -60.0, 60.0)))
+ACTIVATIONS = {"tanh": lambda z: np.tanh(2.5 * z), "relu": lambda z: max(z, 0), "clamped": lambda z: np.clip(z, -1, 1)}
+ACTIVATIONS |= {"sigmoid": lambda z: 1.0 / (1.0 + np.exp(-np.clip(5.0 * z, -60.0, 60.0))), "identity": float}
 
 
 class Champion:

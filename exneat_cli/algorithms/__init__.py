@@ -2,12 +2,14 @@
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
 from exneat_cli.algorithms.baselines import BASELINES, Baseline
-from exneat_cli.algorithms.exneat import NEAT, PAIRINGS, Coevolution, ExNEAT
+from exneat_cli.algorithms.candidates import CHAMPIONS
+from exneat_cli.algorithms.exneat import JUDGINGS, NEAT, Coevolution, ExNEAT
 from exneat_cli.algorithms.neat.conversion import from_stock, pack_teams, to_stock, unpack_teams
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
 from exneat_cli.algorithms.neat.neat_python import neat_config
 from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings
+from exneat_cli.algorithms.pairing import PAIRINGS
 
 ALGORITHMS: dict[str, type[Algorithm]] = {"exneat": ExNEAT, "neat": NEAT, **dict.fromkeys(BASELINES, Baseline)}
 """Every algorithm by the name that it has in `conf/algorithm`."""

@@ -58,8 +58,10 @@ class Problem:
         evolution: how genomes begin, change and compete.
         population: teams per generation.
         episodes: of each team and generation.
-        pairing: ``rank`` or ``index``, how subpopulations form teams.
+        pairing: ``rank``, ``parents`` or ``index``, how subpopulations form teams.
         seed: root of all random streams.
+        judging: ``last`` or ``mean``, which episodes of a team that survives count.
+        champion: ``thesis`` or ``race``, which teams are candidates.
     """
 
     plan: Plan
@@ -68,6 +70,8 @@ class Problem:
     episodes: int
     pairing: str
     seed: int
+    judging: str = "last"
+    champion: str = "thesis"
 
 
 State = tuple[dict[str, Any], dict[str, NDArray[Any]]]

@@ -5,7 +5,8 @@ Imperial College London, 2025, section 3.1.2; Stanley and Miikkulainen, "Evolvin
 topologies", Evolutionary Computation 10(2), 2002. NEAT is the case of one module with one subpopulation.
 
 A generation: `ask` reproduces every subpopulation by the last fitness and pairs their genomes into teams; `tell`
-gives every genome of a team the team's mean over its episodes. The champion is chosen from the hall of fame.
+gives every genome of a team the team's mean over its episodes. Under ``judging=mean`` these are all episodes that the
+team ever had, and a second turn of `ask` and `tell` gives the best fifth some more.
 """
 
 from __future__ import annotations
@@ -13,26 +14,45 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.candidates import with_candidate, with_racers
 from exneat_cli.algorithms.neat.conversion import Columns, pack_teams, unpack_teams
 from exneat_cli.algorithms.neat.neat_python import neat_config
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
+from exneat_cli.algorithms.pairing import by_rank, with_siblings
 from exneat_cli.errors import check_choice
 from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
 from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
 
-PAIRINGS = ("rank", "index")
-"""``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together;
-``index`` pairs in neat-python's own order."""
-MARGIN = 0.1
-"""A team is in the hall of fame while its fitness is at least best - MARGIN * |best|."""
-CAPACITY = 20
+JUDGINGS = ("last", "mean")
+"""Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
+SECOND_LOOKS = 1 / 6
+"""Share of a generation's cost that goes into more episodes for its best teams under ``judging=mean``: for the best
+fifth of those that are left. Re-sampling where it matters, after Flageat and Cully, "Uncertain quality-diversity",
+IEEE Transactions on Evolutionary Computation, 2023."""
+SURVIVORS = 0.1
+"""Least share of the population that survives under ``judging=mean``: only who survives is judged by more episodes."""
+
+
+class Record(NamedTuple):
+    """What a team got: mean fitness over its episodes, how many these are, and whether one of them failed."""
+
+    mean: float = 0.0
+    episodes: int = 0
+    failed: bool = False
+
+    def after(self, mean: float, episodes: int, *, failed: bool) -> Record:
+        """The record with so many episodes more, of this mean."""
+        if not self.episodes:
+            return Record(mean, episodes, failed)
+        total = self.episodes + episodes
+        return Record(self.mean + (mean - self.mean) * episodes / total, total, self.failed or failed)
 
 
 class Coevolution(Search):
@@ -45,12 +65,17 @@ class Coevolution(Search):
     def __init__(self, problem: Problem, state: State | None = None) -> None:
         self._problem = problem
         self._pairing_rng = generator(stream(problem.seed, "pairing"))
+        self._by_mean = problem.judging == "mean"
+        self._looks = int(problem.population * SECOND_LOOKS) if self._by_mean else 0
         self._teams: list[Team] = []
-        self._fitness: list[float] = []  # of the teams, as they compete; empty while they wait for it
+        self._asked: list[int] = []  # the teams that wait for a fitness, by their index
+        self._records: dict[tuple[int, ...], Record] = {}  # of the teams, by their ids
+        self._fitness: list[float] = []  # of the teams, as they compete; empty until the generation is over
         self._generation = self._extinctions = 0
         self._hall_of_fame: list[Candidate] = []
-        shapes = problem.plan.subpopulation_shapes
-        configs = [neat_config(problem.evolution, problem.population, shape) for shape in shapes]
+        shapes, teams = problem.plan.subpopulation_shapes, problem.population - self._looks
+        survivors = math.ceil(SURVIVORS * teams) if self._by_mean else 0
+        configs = [neat_config(problem.evolution, teams, shape, survivors) for shape in shapes]
         if state is None:
             seeds = [stream(problem.seed, "evolution", index) for index in range(len(shapes))]
             self._subpopulations = [Subpopulation(*own) for own in zip(configs, seeds, strict=True)]
@@ -63,9 +88,17 @@ class Coevolution(Search):
             self._restore(plain, arrays)
 
     def ask(self) -> tuple[list[Team], int]:
-        """The teams of the next generation; the first call gives the first one."""
-        if self._teams and not self._fitness:
+        """The teams of the next generation, or those of this one that get a second look."""
+        if self._asked:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
+        if self._teams and not self._fitness:
+            self._asked = best_first(self._judged())[: self._looks]
+        else:
+            self._reproduce()
+            self._asked = list(range(len(self._teams)))
+        return [self._teams[k] for k in self._asked], self._problem.episodes
+
+    def _reproduce(self) -> None:
         ranked = [self._teams[k].ids for k in best_first(self._fitness)]
         self._extinctions = 0
         if self._fitness:
@@ -73,51 +106,73 @@ class Coevolution(Search):
             for index, subpopulation in enumerate(self._subpopulations):
                 fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
                 self._extinctions += subpopulation.advance(fitness)
-        orders = [
-            self._order(list(subpopulation.genomes), [ids[index] for ids in ranked])
-            for index, subpopulation in enumerate(self._subpopulations)
-        ]
+        orders = [list(subpopulation.genomes) for subpopulation in self._subpopulations]
+        if self._problem.pairing != "index":
+            orders = by_rank(orders, ranked, self._pairing_rng)
+        if self._problem.pairing == "parents":
+            orders = with_siblings(orders, ranked, [each.first_parents for each in self._subpopulations])
         self._teams, self._fitness = [self._team(ids) for ids in zip(*orders, strict=True)], []
-        return list(self._teams), self._problem.episodes
+        known = self._records if self._by_mean else {}
+        self._records = {team.ids: known.get(team.ids, Record()) for team in self._teams}
 
     def tell(self, results: Results) -> bool:
-        """Give every team its mean fitness; the generation is over then."""
-        if not self._teams or self._fitness:
+        """Take what the teams got; the generation is over once the best had their second look."""
+        if not self._asked:
             raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
-        if len(results.fitness) != len(self._teams):
-            raise ValueError(f"tell: expected {len(self._teams)} fitness values, got {len(results.fitness)}")
-        fitness = results.fitness.mean(axis=1).tolist()
-        for index, value in enumerate(fitness):
+        if len(results.fitness) != len(self._asked):
+            raise ValueError(f"tell: expected {len(self._asked)} fitness values, got {len(results.fitness)}")
+        means, episodes = results.fitness.mean(axis=1).tolist(), results.fitness.shape[1]
+        for index, value in enumerate(means):
             if not math.isfinite(value):
                 raise ValueError(f"tell: expected finite fitness values, got {value!r} for team {index}")
-        sound = np.flatnonzero(~results.failed).tolist()
-        for k in sound:
-            candidate = Candidate(self._teams[k], fitness[k], self._generation)
-            self._hall_of_fame = with_candidate(self._hall_of_fame, candidate)
-        self._fitness = failed_last(fitness, sound)
-        self._generation += 1
-        return True
+        for k, mean, failed in zip(self._asked, means, results.failed.tolist(), strict=True):
+            ids = self._teams[k].ids
+            self._records[ids] = self._records[ids].after(mean, episodes, failed=failed)
+        is_over = self._looks == 0 or len(self._asked) < len(self._teams)
+        self._asked = []
+        if is_over:
+            self._remember()
+            self._fitness = self._judged()
+            self._generation += 1
+        return is_over
 
-    def _order(self, ids: list[int], ranked: list[int]) -> list[int]:
-        """One subpopulation's `ids` as teams take them: survivors in the order of `ranked`, then offspring shuffled."""
-        if self._problem.pairing == "index":
-            return ids
-        there, before = set(ids), set(ranked)
-        offspring = [key for key in ids if key not in before]
-        shuffled = [offspring[i] for i in self._pairing_rng.permutation(len(offspring))]
-        return [key for key in ranked if key in there] + shuffled
+    def _judged(self) -> list[float]:
+        """Fitness of the teams, as they compete."""
+        records = [self._records[team.ids] for team in self._teams]
+        return failed_last([each.mean for each in records], [k for k, each in enumerate(records) if not each.failed])
+
+    def _remember(self) -> None:
+        """Offer the teams that did not fail for the championship."""
+        offered = [
+            Candidate(team, self._records[team.ids].mean, self._generation)
+            for team in self._teams
+            if not self._records[team.ids].failed
+        ]
+        if self._problem.champion == "race":
+            best = [offered[k] for k in best_first([each.fitness for each in offered])]
+            self._hall_of_fame = with_racers(self._hall_of_fame, best[: math.ceil(SURVIVORS * len(self._teams))])
+            return
+        for candidate in offered:
+            self._hall_of_fame = with_candidate(self._hall_of_fame, candidate)
 
     def _team(self, ids: tuple[int, ...]) -> Team:
         return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
 
     def candidates(self) -> list[Candidate]:
-        """Teams within a tenth of the best fitness so far, see `with_candidate`."""
+        """The teams remembered, see `with_candidate` and `with_racers`."""
         return list(self._hall_of_fame)
 
     def columns(self) -> dict[str, int | float]:
-        """Species, summed over subpopulations, and how many of these were created anew for this generation."""
+        """Species, summed over subpopulations, and how many of these were created anew for this generation.
+
+        Under ``judging=mean`` also the best fitness as it is judged, and the mean mutation power if that is adaptive.
+        """
         species = sum(subpopulation.species_count for subpopulation in self._subpopulations)
-        return {"species": species, "extinctions": self._extinctions}
+        columns: dict[str, int | float] = {"species": species, "extinctions": self._extinctions}
+        if self._by_mean and self._fitness:
+            columns["judged_fitness"] = max(self._fitness)
+        powers = [genome.power for team in self._teams for genome in team.genomes if genome.power is not None]
+        return columns | ({"mutate_power": float(np.mean(powers))} if powers else {})
 
     def state(self) -> State:
         """Subpopulations, teams and hall of fame.
@@ -133,6 +188,7 @@ class Coevolution(Search):
             "pairing": dict(self._pairing_rng.bit_generator.state),
             "teams": [list(team.ids) for team in self._teams],
             "fitness": self._fitness,
+            **({"records": [list(self._records[team.ids]) for team in self._teams]} if self._by_mean else {}),
             "generation": self._generation,
             "hall_of_fame": [[entry.fitness, entry.generation] for entry in self._hall_of_fame],
         }
@@ -151,6 +207,11 @@ class Coevolution(Search):
         self._fitness = [float(value) for value in plain["fitness"]]
         if len(self._fitness) != len(self._teams) or not all(map(math.isfinite, self._fitness)):
             raise ValueError("expected a finite fitness of every team")
+        if self._by_mean:
+            told = [Record(float(mean), int(count), bool(failed)) for mean, count, failed in plain["records"]]
+            if not all(math.isfinite(each.mean) and each.episodes > 0 for each in told):
+                raise ValueError("expected finite means over at least one episode of every team")
+            self._records = {team.ids: each for team, each in zip(self._teams, told, strict=True)}
         self._generation = int(plain["generation"])
         teams = unpack_teams(arrays, "hall_of_fame", self._problem)
         for team, (fitness, generation) in zip(teams, plain["hall_of_fame"], strict=True):
@@ -188,21 +249,6 @@ class NEAT(ExNEAT):
         """One module, whatever the body."""
         refuse_modules(self.name, geometry, linkage, wiring)
         return plan_body(task, hidden=evolution.neat_hidden)
-
-
-def with_candidate(hall_of_fame: Sequence[Candidate], offered: Candidate) -> list[Candidate]:
-    """The hall of fame after a team that did not fail was offered to it, which enters if it is good enough.
-
-    There are at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes, with the
-    best fitness that each ever had; the best first, of equals the earlier one first.
-    """
-    entries = {entry.team.ids: entry for entry in hall_of_fame}
-    known = entries.get(offered.team.ids)
-    if known is None or offered.fitness > known.fitness:
-        entries[offered.team.ids] = offered
-    ranked = sorted(entries.values(), key=lambda entry: (-entry.fitness, entry.generation))
-    threshold = ranked[0].fitness - MARGIN * abs(ranked[0].fitness)
-    return [entry for entry in ranked if entry.fitness >= threshold][:CAPACITY]
 
 
 def failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:

@@ -22,17 +22,25 @@ _CURVES: dict[str, styles.Look] = {
     "best_fitness": {"label": "best of the generation", "color": styles.BLUE, "linewidth": 1.8},
     "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8},
     "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2},
+    "judged_fitness": {"label": "best by all of its episodes", "color": styles.PURPLE, "linewidth": 1.8},
 }
+_TESTED: styles.Look = {"label": "champion, test mean", "color": "#222222", "linewidth": 1.2, "linestyle": ":"}
 
 
-def draw_training(run: RunDirectory, fitness_name: str) -> list[Path]:
-    """Draw the fitness per generation in a run's history.csv, as PNG and SVG; `fitness_name` is its label."""
+def draw_training(run: RunDirectory, fitness_name: str, tested: float | None = None) -> list[Path]:
+    """Draw the fitness per generation in a run's history.csv, as PNG and SVG.
+
+    `fitness_name` is its label, and `tested` the champion's mean over the test episodes.
+    """
     history = read_csv(run.history, HISTORY_COLUMNS)
     with styles.style():
         figure = Figure(figsize=(7.0, 4.2), layout="constrained")
         axes = figure.add_subplot()
         for column, look in _CURVES.items():
-            axes.plot(history["generation"], history[column], **look)
+            if column in history:
+                axes.plot(history["generation"], history[column], **look)
+        if tested is not None:
+            axes.axhline(tested, **_TESTED)
         axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
         styles.tick_levels(axes, history["generation"])
         axes.legend(loc="upper left")

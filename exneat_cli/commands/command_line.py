@@ -13,6 +13,7 @@ import difflib
 import itertools
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +23,7 @@ import hydra
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, Quote, QuotedString
-from hydra.errors import HydraException, MissingConfigException
+from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
@@ -272,6 +273,9 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
     cause = error.__cause__
     if isinstance(cause, ConfigKeyError | ConfigAttributeError) and cause.parent_node is not None:
         return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
+    if isinstance(error, ConfigCompositionException) and (found := re.match(r"Could not override '(\w+)'", str(error))):
+        of_robots = "\n  recipes are for robots: task=ant, task=robot" if found[1] == "recipe" else ""
+        return f"{found[1]}: expected nothing, since the task that was chosen has no {found[1]} to choose{of_robots}"
     first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
     if key := getattr(error, "full_key", None):
         first = f"{key}: {first}"

@@ -15,6 +15,12 @@ from exneat_cli.runs import read_task
 from exneat_cli.tasks import Task
 from exneat_cli.wiring import GEOMETRIES, Geometry, Module
 
+_WITH_TASKS = (
+    *("task", "algorithm", "linkage", "evolution", "recipe", "wiring", "judging", "champion"),
+    *("budgets", "executor", "name"),
+)
+"""What a task's file and its recipe set; of all that, only the task is shown."""
+
 
 def run(line: CommandLine) -> int:
     """Print the wiring of ``run=<directory>``, the parts of ``task=<name>``, or the runs below ``output=<directory>``.
@@ -22,7 +28,7 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
-    plain = line.compose_only(("run", "output"), ("task", "evolution", "budgets", "executor", "name"))
+    plain = line.compose_only(("run", "output"), _WITH_TASKS)
     if "task" in plain:
         name_code(line, plain)
         _show_task(read_task(plain["task"]))

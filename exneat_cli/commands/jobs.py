@@ -17,6 +17,8 @@ BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
 _SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings) if f.name != "task_kind")
 _SPENT = ("generations", "population", "episodes", "validation_episodes", "test_episodes", "sweep_episodes")
+_OF_MODULES = ("linkage", "wiring.central", "wiring.trunk", "wiring.output_width")
+"""Settings that a recipe may make impossible."""
 _OF_SWEEPS = ("parameter", "label", "levels")
 
 
@@ -81,7 +83,7 @@ class Job:
 
         fitness, labels = self.settings.task.fitness_name, {sweep.name: sweep.label for sweep in self.sweeps}
         draw = {
-            "training": lambda: draw_training(directory, fitness),
+            "training": lambda: draw_training(directory, fitness, directory.read_result().champion.fitness_mean),
             "path": lambda: draw_path(directory),
             "network": lambda: draw_network(directory),
             "robustness": lambda: draw_robustness(directory, labels, fitness),
@@ -105,11 +107,18 @@ def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
     """
     plain = line.compose()
     name_code(line, plain)
-    check_keys("", plain, (*_SETTINGS, "budget", "budgets", "sweep", "sweeps", *others))
+    check_keys("", plain, (*_SETTINGS, "recipe", "budget", "budgets", "sweep", "sweeps", *others))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)
         check_keys(f"budgets.{budget}.", check_section(f"budgets.{budget}", spent), _SPENT)
-    return with_sweeps(name, RunSettings.from_plain({key: plain[key] for key in _SETTINGS if key in plain}), plain)
+    try:
+        settings = RunSettings.from_plain({key: plain[key] for key in _SETTINGS if key in plain})
+    except ConfigError as error:
+        key, expected, came, fix = error.args
+        if plain.get("recipe") == "walking" and key in _OF_MODULES:
+            fix = "; ".join(filter(None, [fix, "recipe=thesis has hidden nodes and a central module"]))
+        raise ConfigError(key, expected, came, fix) from error
+    return with_sweeps(name, settings, plain)
 
 
 def with_sweeps(name: str, settings: RunSettings, plain: Mapping[str, Any]) -> Job:

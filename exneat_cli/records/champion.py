@@ -160,19 +160,21 @@ def _check(champion: Champion) -> None:
         check_genome(genome.in_arrays(), inputs, outputs, feed_forward=champion.feed_forward)
 
 
-def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[float]) -> None:
-    """Write one line per team, the best in `validation`, mean fitness of each on those episodes, first.
+def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[Score]) -> None:
+    """Write one line per team: first who had the most validation episodes, and of these the one with the best mean.
 
     Raises:
         ExneatError: the file cannot be written.
     """
-    ranked = sorted(zip(entries, validation, strict=True), key=lambda pair: -pair[1])
+    pairs = zip(entries, validation, strict=True)
+    ranked = sorted(pairs, key=lambda pair: (-pair[1].episodes, -pair[1].fitness_mean))
     lines = [
         {
             "rank": rank,
             "generation": entry.generation + 1,
             "training_fitness": entry.fitness,
-            "validation_fitness": score,
+            "validation_fitness": score.fitness_mean,
+            "validation_episodes": score.episodes,
             "genomes": [msgspec.to_builtins(Genome.of(genome)) for genome in entry.team.genomes],
         }
         for rank, (entry, score) in enumerate(ranked, start=1)

@@ -15,8 +15,11 @@ FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"
 
 
-class Score(Struct, frozen=True, forbid_unknown_fields=True):
-    """Means and standard deviations (population, over episodes) of one brain, and its fitness in each of them."""
+class Score(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Means and standard deviations (population, over episodes) of one brain, and its fitness in each of them.
+
+    Runs of earlier versions do not have `steps_mean`, of control steps.
+    """
 
     episodes: Annotated[int, Meta(ge=1)]
     fitness_mean: Real
@@ -25,6 +28,7 @@ class Score(Struct, frozen=True, forbid_unknown_fields=True):
     full_reward_std: Real
     failed_episodes: Count
     fitness: tuple[Real, ...]
+    steps_mean: Real | None = None
 
 
 class Result(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -23,16 +23,17 @@ from exneat_cli.records import (
 )
 from exneat_cli.rollouts import Outcomes, Runner, Trace, is_compiled
 from exneat_cli.runs.progress import Progress
+from exneat_cli.runs.race import FIRST_ROUND, race
 from exneat_cli.runs.settings import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
-from exneat_cli.tasks import Task
+from exneat_cli.tasks import HasDistance, Task
 
 
 def choose_champion(training: Training, directory: RunDirectory, progress: Progress) -> Result:
     """Validate the candidates, test the best, write both; returns the figures for the manifest.
 
-    Source of the rule: Zhang (2025), section 3.3.
+    Under ``champion=thesis`` all of them have all validation episodes (Zhang, 2025, section 3.3), else they race.
 
     Raises:
         ExneatError: there is no candidate.
@@ -42,11 +43,12 @@ def choose_champion(training: Training, directory: RunDirectory, progress: Progr
         raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
     last = training.history[-1]
     directory.update_manifest(budget_spent={key: last[key] for key in ("episodes", "env_steps", "wall_seconds")})
-    progress.say(f"validating {len(candidates)} teams of the hall of fame")
+    progress.say(f"validating {len(candidates)} teams")
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         brains = [_compile(settings, candidate.team) for candidate in candidates]
-        validation = score_all(runner.run(brains, shared_episodes("validation", settings.validation_episodes)))
-        best = max(range(len(candidates)), key=lambda k: validation[k].fitness_mean)
+        episodes = shared_episodes("validation", settings.validation_episodes)
+        best, got = race(runner, brains, episodes, FIRST_ROUND if settings.champion == "race" else len(episodes))
+        validation = [score for outcomes in got for score in score_all(outcomes)]
         first, tests = _compile(settings, training.first_generation), shared_episodes("test", settings.test_episodes)
         tested = score_all(runner.run([brains[best], _standing_still(settings), first], tests))
         trace = runner.trace(brains[best], tests[0])
@@ -56,7 +58,7 @@ def choose_champion(training: Training, directory: RunDirectory, progress: Progr
         validation=validation[best],
         test=tested[0],
     )
-    write_hall_of_fame(directory.hall_of_fame, candidates, [each.fitness_mean for each in validation])
+    write_hall_of_fame(directory.hall_of_fame, candidates, validation)
     write_json(directory.champion, _champion(settings, champion.team, scores))
     _write_trace(settings, directory, trace)
     return Result(
@@ -124,8 +126,9 @@ def score_all(outcomes: Outcomes) -> list[Score]:
             full_reward_std=float(full_reward.std()),
             failed_episodes=int(failed.sum()),
             fitness=tuple(fitness.tolist()),
+            steps_mean=float(steps.mean()),
         )
-        for fitness, full_reward, failed in zip(outcomes.fitness, outcomes.full_reward, outcomes.failed, strict=True)
+        for fitness, full_reward, steps, failed in zip(*outcomes[:4], strict=True)
     ]
 
 
@@ -146,8 +149,8 @@ def robustness_row(settings: RunSettings, parameter: str, level: float, score: S
 def summary_sentence(task: Task, result: Result) -> str:
     """What a run learned, in one sentence, from the `result` entry of its manifest; another tells of plain Python.
 
-    It says "Learned" only if the champion beats both baselines clearly: on the same test episodes, the
-    mean difference exceeds twice its standard error.
+    It says "Learned" only if the champion beats both baselines clearly, and where a task is about moving forward, does
+    so in most episodes. Clearly: on the same test episodes, the mean difference exceeds twice its standard error.
     """
     champion, standing = result.champion, result.standing_still
     digits = task.fitness_decimals
@@ -158,15 +161,29 @@ def summary_sentence(task: Task, result: Result) -> str:
         f"(sd {champion.fitness_std:.{digits}f}{failures}), "
         f"beside {standing.fitness_mean:.{digits}f} for standing still"
     )
-    first = result.first_generation
+    first, way = result.first_generation, _way(task, champion)
     speed = "" if is_compiled(task) else f" task={task.name} runs in plain Python, which is slower than compiled tasks."
     if first is None:
-        return f"No training: {episodes} the baseline {earned}.{speed}"
-    learned = _clearly_better(champion, standing) and _clearly_better(champion, first)
+        return f"No training: {episodes} the baseline {way}{earned}.{speed}"
+    forward = not isinstance(task, HasDistance) or _moving_forward(champion) > champion.episodes / 2
+    learned = forward and _clearly_better(champion, standing) and _clearly_better(champion, first)
     return (
-        f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {earned} "
+        f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {way}{earned} "
         f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation.{speed}"
     )
+
+
+def _way(task: Task, score: Score) -> str:
+    """How far it went, where the task tells, e.g. ``walks 31 m in 50 s (0.62 m/s), forward in 20 of 20, and ``."""
+    if not isinstance(task, HasDistance) or score.steps_mean is None:
+        return ""
+    metres, seconds = task.metres_of(score.fitness_mean), task.seconds_of(score.steps_mean)
+    forward = f"forward in {_moving_forward(score)} of {score.episodes}"
+    return f"went {metres:.1f} m in {seconds:.0f} s ({metres / seconds:.2f} m/s), {forward}, and "
+
+
+def _moving_forward(score: Score) -> int:
+    return sum(fitness > 0.0 for fitness in score.fitness)
 
 
 def _clearly_better(one: Score, other: Score) -> bool:

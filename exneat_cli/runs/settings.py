@@ -8,7 +8,16 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
+from exneat_cli.algorithms import (
+    ALGORITHMS,
+    CHAMPIONS,
+    JUDGINGS,
+    PAIRINGS,
+    RECURRENT,
+    Algorithm,
+    EvolutionSettings,
+    ExNEAT,
+)
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
@@ -20,6 +29,19 @@ from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 _Part = TypeVar("_Part")
 _NO_POSE = 0.1
 """The `noise.reset_scale` of tasks that have no initial pose: it disturbs nothing, and is part of hashes."""
+_CAME_LATER = (
+    ("", "judging", "last"),
+    ("", "champion", "thesis"),
+    ("wiring", "trunk", "none"),
+    ("evolution", "output_activation", None),
+    ("evolution", "mutation", "fixed"),
+    ("evolution", "weight_mutate_power_min", 0.0),
+    ("evolution", "weight_mutate_power_max", 12.0),
+    ("evolution", "crossover_prob", 1.0),
+    ("evolution", "parent_selection", "uniform"),
+)
+"""Settings by section and name that came later, with the value that gives what was before: runs with that value keep
+their hashes."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -37,8 +59,11 @@ class RunSettings:
         seed: root of all random streams but those of validation and test.
         generations, population: of each subpopulation.
         episodes: training episodes per team and generation.
-        pairing: ``rank`` or ``index``.
-        validation_episodes: per team of the hall of fame.
+        pairing: ``rank``, ``parents`` or ``index``.
+        judging: ``last`` or ``mean``: a team that survives competes by its mean over the episodes of one generation, or
+            over all that it ever had; then the best get a second look, at the expense of new teams.
+        champion: ``race`` or ``thesis``, how the champion is chosen.
+        validation_episodes: per team of the hall of fame; in a race, of the last teams in it.
         test_episodes: per brain that is tested.
         name: directory below `output`; None takes the task's name.
         output: root of all run directories.
@@ -64,6 +89,8 @@ class RunSettings:
     population: int = 100
     episodes: int = 1
     pairing: str = "rank"
+    judging: str = "last"
+    champion: str = "thesis"
     validation_episodes: int = 10
     test_episodes: int = 20
     name: str | None = None
@@ -84,6 +111,8 @@ class RunSettings:
         check_whole("population", self.population, 2, 1_000_000)
         check_whole("episodes", self.episodes, 1)
         check_choice("pairing", self.pairing, PAIRINGS)
+        check_choice("judging", self.judging, JUDGINGS)
+        check_choice("champion", self.champion, CHAMPIONS)
         check_whole("validation_episodes", self.validation_episodes, 1)
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
@@ -146,8 +175,10 @@ class RunSettings:
         """What is hashed: the settings with defaults that depend on the task spelled out."""
         plain = self.to_plain()
         plain["task"] = {**self.task.identity(), **({} if self.task_kind is None else {"kind": self.task_kind})}
-        if self.wiring.trunk == Wiring().trunk:  # came later: runs without it keep their hashes
-            del plain["wiring"]["trunk"]
+        for section, name, before in _CAME_LATER:
+            own = plain[section] if section else plain
+            if own[name] == before:
+                del own[name]
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))

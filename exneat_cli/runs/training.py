@@ -136,6 +136,8 @@ def _problem(settings: RunSettings) -> Problem:
         episodes=settings.episodes,
         pairing=settings.pairing,
         seed=settings.seed,
+        judging=settings.judging,
+        champion=settings.champion,
     )
 
 

@@ -221,3 +221,14 @@ class HasFullReward(Protocol):
 
     def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) the second figure that tests report."""
+
+
+@runtime_checkable
+class HasDistance(Protocol):
+    """A task whose fitness says how far an episode led."""
+
+    def metres_of(self, fitness: float) -> float:
+        """Distance travelled forward (m)."""
+
+    def seconds_of(self, steps: float) -> float:
+        """What so many control steps take (s)."""

@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from exneat_cli.algorithms import Candidate, Coevolution, EvolutionSettings, Team, from_stock, neat_config, to_stock
-from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties, with_candidate
+from exneat_cli.algorithms.candidates import with_candidate
+from exneat_cli.algorithms.exneat import best_first, failed_last, separate_ties
 from exneat_cli.seeding import stream
 from tests.algorithms.problems import contents, problem_of, synthetic, tell
 
@@ -84,6 +85,33 @@ def test_index_pairing_keeps_neat_pythons_order() -> None:
         for index, subpopulation in enumerate(evolution._subpopulations):
             assert [team.ids[index] for team in teams] == list(subpopulation.genomes)
         tell(evolution, [synthetic(team) for team in teams])
+
+
+@pytest.mark.parametrize("genome", ["array", "stock"])
+def test_parents_pairing_lets_siblings_meet_and_keeps_survivors_where_rank_has_them(genome: str) -> None:
+    settings, met = EvolutionSettings(genome=genome, compatibility_threshold=100.0, survival_threshold=0.1), 0
+    evolution = Coevolution(problem_of(settings, 40, 3, pairing="parents", seed=4))
+    teams = evolution.ask()[0]
+    for _ in range(4):
+        values = [synthetic(team) for team in teams]
+        tell(evolution, values)
+        team_of = [{team.ids[s]: k for k, team in enumerate(teams)} for s in range(3)]
+        following = evolution.ask()[0]
+        for subpopulation in evolution._subpopulations:
+            assert subpopulation.genomes.keys() == {
+                t.ids[evolution._subpopulations.index(subpopulation)] for t in following
+            }
+        best = sorted(range(40), key=lambda k: -values[k])[:2]
+        assert [team.ids for team in following[:2]] == [teams[k].ids for k in best]
+        for team in following[2:]:
+            lines = {
+                own[sub.first_parents[key]]
+                for key, own, sub in zip(team.ids, team_of, evolution._subpopulations, strict=True)
+            }
+            met += len(lines) == 1
+        teams = following
+    # Of 38 offspring of 4 parents each; at random, a sixteenth would meet.
+    assert met > 4 * 38 * 0.5
 
 
 @pytest.mark.parametrize("genome", ["array", "stock"])

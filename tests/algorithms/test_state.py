@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exneat_cli.algorithms import Coevolution, EvolutionSettings, ExNEAT, Problem, State
+from exneat_cli.algorithms import ACTIVATIONS, Coevolution, EvolutionSettings, ExNEAT, Problem, State
 from tests.algorithms.problems import contents, problem_of, tell
 
 POPULATION = 20
@@ -132,7 +132,7 @@ def test_a_state_of_another_population_is_refused() -> None:
         ("node.bias", lambda column: np.full_like(column, np.inf)),
         ("node.key", lambda column: column * 0),
         ("node.key", lambda column: column + 1),
-        ("node.activation", lambda column: column + 4),
+        ("node.activation", lambda column: column + len(ACTIVATIONS)),
         ("connection.weight", lambda column: column.astype(np.float32)),
         ("connection.source", lambda column: column + 1000),
         ("connection.source", lambda column: column - 1000),

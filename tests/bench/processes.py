@@ -15,8 +15,8 @@ from tests.bench.measurement import MEGABYTES, SECONDS, Bar, Row, VerificationEr
 HELP_REPETITIONS = 5
 TRAIN_REPETITIONS = 2
 SHORT_GENERATIONS = 3
-SMOKE = ("train", "budget=smoke", "geometry=all")
-PAPER = ("train", "task=ant", "geometry=all", "budget=paper")
+SMOKE = ("train", "recipe=thesis", "budget=smoke", "geometry=all")
+PAPER = ("train", "task=ant", "recipe=thesis", "geometry=all", "budget=paper")
 
 HELP_BAR = Bar(1.0, at_least=False)
 COLD_BAR = Bar(40.0, at_least=False)

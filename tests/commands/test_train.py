@@ -136,7 +136,7 @@ def test_inspect_calls_a_run_killed_whose_process_is_gone(tmp_path: Path, capfd:
 def test_inspect_shows_sensors_joints_and_sizes_of_every_module(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert train(f"output={tmp_path}", "geometry=cross", "linkage=full") == 0
+    assert train(f"output={tmp_path}", "recipe=thesis", "geometry=cross", "linkage=full") == 0
     capfd.readouterr()
     assert main(["inspect", f"run={the_run(tmp_path)}"]) == 0
     shown = capfd.readouterr().out
@@ -209,7 +209,8 @@ def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
 
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
-    from_files = read_job("", read_command_line("train", [f"task={task}"])).settings.to_plain()
+    thesis = ["recipe=thesis"] if task in ("ant", "robot") else []
+    from_files = read_job("", read_command_line("train", [f"task={task}", *thesis])).settings.to_plain()
     from_python = RunSettings(task=TASKS[task](), name=task).to_plain()
     budget = ("generations", "population", "episodes", "validation_episodes", "test_episodes")
     if task == "gym":  # which chooses another
@@ -257,9 +258,10 @@ def shown_settings(command: str) -> list[str]:
     lines = {
         "train": [
             "seed: 0 ",
-            "# evolution=feed_forward\n",
+            "# recipe=walking\n",
+            "# evolution=walking\n",
             "  max_steps: 1000 ",
-            "neat_hidden: 6 ",
+            "neat_hidden: 0 ",
             "  sensor_std: 0.0 ",
             "sweep: none ",
         ],

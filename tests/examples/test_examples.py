@@ -36,11 +36,11 @@ CHAMPIONS = {
     "modules on Ant, linked, with a central one": RunSettings(
         task=WALK, geometry=Geometry("all"), linkage="full", evolution=EvolutionSettings(**BUSY), **SHORT
     ),
-    "modules on Ant that share a genome, with sigmoids and no central one": RunSettings(
+    "modules on Ant that share a genome, with sigmoids, clamped outputs and no central one": RunSettings(
         task=WALK,
         linkage="hidden",
         wiring=Wiring(central=False),
-        evolution=EvolutionSettings(activation_default="sigmoid", **BUSY),
+        evolution=EvolutionSettings(activation_default="sigmoid", output_activation="clamped", **BUSY),
         **SHORT,
     ),
     "recurrent modules that hunt, linked": RunSettings(

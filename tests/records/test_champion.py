@@ -27,6 +27,11 @@ Place = tuple[Any, ...]
 TEST = Score(3, 1.0, 0.5, 2.0, 0.5, 0, (0.5, 1.0, 1.5))
 
 
+def score_of(mean: float) -> Score:
+    """A score of two validation episodes."""
+    return Score(2, mean, 0.0, mean, 0.0, 0, (mean, mean))
+
+
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A champion with links and a central module, as data."""
@@ -193,7 +198,7 @@ def test_the_hall_of_fame_is_one_team_a_line_the_best_on_validation_first(
 ) -> None:
     genomes = tuple(genome.in_arrays() for genome in read(tmp_path, sound).genomes)
     entries = [Candidate(Team(genomes, ()), fitness, generation) for generation, fitness in enumerate([5.0, 6.0])]
-    write_hall_of_fame(tmp_path / "hall_of_fame.jsonl", entries, [3.0, 4.0])
+    write_hall_of_fame(tmp_path / "hall_of_fame.jsonl", entries, [score_of(3.0), score_of(4.0)])
     lines = [json.loads(line) for line in (tmp_path / "hall_of_fame.jsonl").read_text().splitlines()]
     assert [(line["rank"], line["generation"], line["validation_fitness"]) for line in lines] == [(1, 2, 4), (2, 1, 3)]
     assert all(line["genomes"] == sound["genomes"] for line in lines)

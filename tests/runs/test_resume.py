@@ -115,6 +115,18 @@ def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     assert any(text.startswith("going on after generation 2") for text in said)
 
 
+def test_a_run_that_judges_by_all_episodes_and_adapts_its_mutations_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    adaptive = dataclasses.replace(
+        RECURRENT, mutation="adaptive", weight_mutate_power_min=0.01, crossover_prob=0.3, parent_selection="rank"
+    )
+    changes = {"evolution": adaptive, "judging": "mean", "champion": "race", "pairing": "parents"}
+    undisturbed = content(train(small(tmp_path / "undisturbed", **changes)).directory)
+    for generation in range(1, GENERATIONS + 1):
+        settings = small(tmp_path / str(generation), **changes)
+        train_stopping(settings, "write_checkpoint", generation)
+        assert resumed(settings)[0] == undisturbed
+
+
 @pytest.mark.parametrize("name", ["write_hall_of_fame", "write_json", "write_csv"])
 def test_a_run_that_stops_after_training_trains_no_more(tmp_path: Path, name: str) -> None:
     undisturbed = content(train(small(tmp_path / "undisturbed")).directory)

@@ -81,7 +81,7 @@ def test_random_actions_are_tested_without_training(tmp_path: Path) -> None:
         (row,) = csv.DictReader(file)
     assert (row["variant"], row["parameter"], row["level"], row["episodes"]) == ("random", "none", "0.0", "2")
     assert float(row["fitness_mean"]) == finished.result.champion.fitness_mean
-    assert finished.summary.startswith("No training: on 2 test episodes the baseline earned")
+    assert finished.summary.startswith("No training: on 2 test episodes the baseline went ")
 
 
 @pytest.mark.parametrize("algorithm", ["exneat", "neat"])

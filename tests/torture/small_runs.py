@@ -18,7 +18,7 @@ _SIZES = {
     "foraging": ["generations=12", "population=40", "episodes=2"],
     "hunting": ["generations=12", "population=40", "episodes=4"],
 }
-_LINKED = {"ant": ["geometry=all", "linkage=full"]}
+_LINKED = {"ant": ["recipe=thesis", "geometry=all", "linkage=full"]}
 _LINKED_GRID = ["geometry=all", "linkage=output"]
 _TINY = ["budget=smoke", "executor=serial", "validation_episodes=2", "test_episodes=2"]
 _UNCOMPARED = ("manifest.json", "config.yaml")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -114,8 +115,14 @@ def check_genome(genome: ArrayGenome, inputs: int, outputs: int, *, feed_forward
 
 
 def pack(genomes: Sequence[ArrayGenome | neat.DefaultGenome], prefix: str) -> dict[str, NDArray[Any]]:
-    """Ids and numbers of genes of each genome, and every field of all genes end to end; names begin with `prefix`."""
-    columns = {f"{prefix}.id": np.array([genome.key for genome in genomes], _WHOLE)}
+    """Ids, numbers of genes and any mutation powers of each genome, and every field of all genes end to end.
+
+    Names begin with `prefix`.
+    """
+    columns: dict[str, NDArray[Any]] = {f"{prefix}.id": np.array([genome.key for genome in genomes], _WHOLE)}
+    powers = [genome.power for genome in genomes if isinstance(genome, ArrayGenome)]
+    if powers and None not in powers:
+        columns[f"{prefix}.power"] = np.array(powers, np.float64)
     tables = zip(*(tables_of(genome) for genome in genomes), strict=True)
     for (kind, dtype), own in zip((("node", NODE), ("connection", CONNECTION)), tables, strict=True):
         genes = end_to_end(own, dtype)
@@ -144,9 +151,15 @@ def unpack(
         raise ValueError(f"{prefix}.id: expected genomes with different ids")
     nodes = _tables(columns, f"{prefix}.node", NODE, len(keys))
     connections = _tables(columns, f"{prefix}.connection", CONNECTION, len(keys))
+    powers: list[Any] = [None] * len(keys)
+    if f"{prefix}.power" in columns:
+        powers = _column(columns, f"{prefix}.power", np.dtype(np.float64), len(keys)).tolist()
+        if not all(math.isfinite(power) and power > 0.0 for power in powers):
+            raise ValueError(f"{prefix}.power: expected finite numbers above 0")
     genomes = []
-    for key, own_nodes, own_connections in zip(keys.tolist(), nodes, connections, strict=True):
+    for key, power, own_nodes, own_connections in zip(keys.tolist(), powers, nodes, connections, strict=True):
         genome = ArrayGenome(key)
+        genome.power = power
         genome.nodes, genome.connections = own_nodes.copy(), own_connections.copy()
         check_genes(genome)
         check_genome(genome, shape[0], shape[2], feed_forward=feed_forward)

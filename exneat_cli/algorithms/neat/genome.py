@@ -6,6 +6,7 @@ see no difference but speed. Wherever a method takes a `config`, that is the `ge
 
 from __future__ import annotations
 
+import math
 from operator import attrgetter
 from typing import Any
 
@@ -48,15 +49,17 @@ class ArrayGenome:
         fitness: None until it is known.
         nodes: (N,) of kind `NODE`, sorted; never changed in place once the genome is made.
         connections: (C,) of kind `CONNECTION`, likewise.
+        power: its own `weight_mutate_power` where mutation is adaptive, else None.
     """
 
-    __slots__ = ("connections", "fitness", "key", "nodes")
+    __slots__ = ("connections", "fitness", "key", "nodes", "power")
 
     def __init__(self, key: int) -> None:
         self.key = key
         self.fitness: Any = None
         self.nodes = np.zeros(0, NODE)
         self.connections = np.zeros(0, CONNECTION)
+        self.power: float | None = None
 
     @property
     def genes(self) -> Genes:
@@ -71,12 +74,24 @@ class ArrayGenome:
         self.nodes["bias"] = _initial(number(config, "bias"), self.nodes.size, rng)
         self.nodes["response"] = _initial(number(config, "response"), self.nodes.size, rng)
         self.nodes["activation"] = ACTIVATIONS.index(config.activation_default)
+        self.nodes["activation"][: config.num_outputs] = ACTIVATIONS.index(config.output_activation)
         self.connections = _initial_connections(config)
         weights = _initial(number(config, "weight"), self.connections.size, rng)
         self.connections["weight"] = np.abs(weights) if config.positive_start else weights
+        if config.mutation == "adaptive":
+            self.power = config.weight_mutate_power
 
     def configure_crossover(self, genome1: ArrayGenome, genome2: ArrayGenome, config: DefaultGenomeConfig) -> None:
-        """Make a child; of equally fit parents the second one counts as fitter, as in neat-python."""
+        """Make a child; of equally fit parents the second one counts as fitter, as in neat-python.
+
+        With the chance 1 - `crossover_prob` it is a copy of the first, whatever their fitness. A child of two has the
+        geometric mean of their mutation powers.
+        """
+        if config.crossover_prob < 1.0 and config.generator.random() >= config.crossover_prob:
+            self.nodes, self.connections, self.power = genome1.nodes.copy(), genome1.connections.copy(), genome1.power
+            return
+        if genome1.power is not None and genome2.power is not None:
+            self.power = math.sqrt(genome1.power * genome2.power)
         fitter, other = (genome1, genome2) if genome1.fitness > genome2.fitness else (genome2, genome1)
         self.nodes, self.connections = cross(fitter.genes, other.genes, config.generator)
 
@@ -94,8 +109,23 @@ class ArrayGenome:
             self.connections = _without(self.connections, int(rng.integers(self.connections.size)))
         disable_rate = config.enabled_mutate_rate + config.enabled_rate_to_false_add
         enable_rate = config.enabled_mutate_rate + config.enabled_rate_to_true_add
-        numbers = number(config, "weight"), number(config, "bias"), number(config, "response")
+        scale = self._vary_power(config) if self.power is not None else 1.0
+        weight, bias = (_scaled(number(config, name), scale) for name in ("weight", "bias"))
+        numbers = weight, bias, number(config, "response")
         mutate_attributes(self.genes, numbers, disable_rate, enable_rate, rng)
+
+    def _vary_power(self, config: DefaultGenomeConfig) -> float:
+        """Vary the genome's own mutation power; returns its share of the one that all genomes began with.
+
+        Log-normal self-adaptation of one step size, with the learning rate 1 / sqrt(n) of n weights and biases
+        (Schwefel, "Numerical optimization of computer models", 1981; Beyer and Schwefel, "Evolution strategies",
+        Natural Computing 1, 2002, section 4.2). Without a lower bound it collapses: small changes do the least harm.
+        """
+        assert self.power is not None
+        rate = 1.0 / math.sqrt(self.nodes.size + self.connections.size)
+        varied = self.power * math.exp(rate * config.generator.standard_normal())
+        self.power = min(max(varied, config.weight_mutate_power_min), config.weight_mutate_power_max)
+        return self.power / float(config.weight_mutate_power)
 
     def _add_node(self, config: DefaultGenomeConfig) -> None:
         """Split a random connection, enabled or not."""
@@ -149,6 +179,12 @@ class ArrayGenome:
     def size(self) -> tuple[int, int]:
         """Numbers of nodes and of enabled connections."""
         return self.nodes.size, int(np.count_nonzero(self.connections["enabled"]))
+
+
+def _scaled(number: Number, scale: float) -> Number:
+    """The same, but shifts are N(0, power * scale)."""
+    mean, sd, shift_rate, replace_rate, power, low, high = number
+    return mean, sd, shift_rate, replace_rate, power * scale, low, high
 
 
 def _with(table: NDArray[np.void], row: int, gene: tuple[float, ...]) -> NDArray[np.void]:

@@ -52,6 +52,26 @@ activation_mutate_rate=0 aggregation_default=sum aggregation_options=sum aggrega
 neat-python takes for true."""
 
 
+_OURS = (
+    *("positive_start", "mutation", "weight_mutate_power_min", "weight_mutate_power_max"),
+    *("crossover_prob", "parent_selection"),
+)
+"""Settings of genomes that neat-python does not have."""
+
+
+class RankedParents(random.Random):
+    """Python's generator, but of a sequence, best first, it chooses the first of n with a chance of about 2 / n.
+
+    neat-python chooses parents so, and array genomes nothing else. The better of two uniform draws is linear ranking
+    (Blickle and Thiele, "A comparison of selection schemes used in evolutionary algorithms", Evolutionary Computation
+    4(4), 1996).
+    """
+
+    def choice(self, seq: Any) -> Any:
+        """One of them."""
+        return seq[min(self.randrange(len(seq)), self.randrange(len(seq)))]
+
+
 @contextmanager
 def drawing_from(chance: random.Random) -> Iterator[None]:
     """While inside, neat-python draws from `chance` instead of Python's global generator.
@@ -85,6 +105,7 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
     def __init__(self, config: Any, reporters: ReporterSet, stagnation: Any) -> None:
         super().__init__(config, reporters, stagnation)
         self.genome_indexer = counter(1)
+        self.first_parents: dict[int, int] = {}  # of the offspring that were made last
 
     def create_new(self, genome_type: Any, genome_config: Any, num_genomes: int) -> dict[int, Any]:
         """Initial genomes by id, in which the initial hidden nodes have the same keys.
@@ -97,27 +118,34 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
         genome_config.node_indexer = itertools.cycle(range(first, first + hidden))
         genomes: dict[int, Any] = super().create_new(genome_type, genome_config, num_genomes)
         genome_config.node_indexer = later_nodes
-        if genome_config.positive_start and issubclass(genome_type, neat.DefaultGenome):
+        if issubclass(genome_type, neat.DefaultGenome):
             for genome in genomes.values():
-                for gene in genome.connections.values():
+                for key in genome_config.output_keys:
+                    genome.nodes[key].activation = genome_config.output_activation
+                for gene in genome.connections.values() if genome_config.positive_start else ():
                     gene.weight = abs(gene.weight)
         return genomes
 
     def reproduce(
         self, config: neat.Config, species: DefaultSpeciesSet, pop_size: int, generation: int
     ) -> dict[int, Any]:
-        """The next generation by id, after elitism and minimum species size were cut to what fits.
+        """The next generation by id, after elitism and minimum species size were made to fit.
 
-        neat-python stops a run when the species together may claim more than the population.
+        neat-python stops a run when the species together may claim more than the population. And elitism is raised
+        until all species together keep `survivors` genomes.
         """
         configured = self.reproduction_config
         elitism, min_species_size = configured.elitism, configured.min_species_size
         share = pop_size // len(species.species)
-        configured.elitism, configured.min_species_size = min(elitism, share), min(min_species_size, share)
+        sizes = [len(each.members) for each in species.species.values()]
+        least = next(k for k in range(pop_size + 1) if sum(min(k, size) for size in sizes) >= configured.survivors)
+        configured.elitism = min(max(elitism, least), share)
+        configured.min_species_size = min(min_species_size, share)
         try:
             genomes: dict[int, Any] = super().reproduce(config, species, pop_size, generation)
         finally:
             configured.elitism, configured.min_species_size = elitism, min_species_size
+        self.first_parents = {key: parents[0] for key, parents in self.ancestors.items() if parents}
         # neat-python keeps every genome's parents for ever, and asks for none of them.
         self.ancestors.clear()
         return genomes
@@ -133,11 +161,14 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
         return adjusted
 
 
-def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, int, int]) -> neat.Config:
+def neat_config(
+    settings: EvolutionSettings, population: int, shape: tuple[int, int, int], survivors: int = 0
+) -> neat.Config:
     """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
 
-    `shape` is inputs, initial hidden nodes and outputs. Its `genome_config` has two attributes more: `positive_start`,
-    and `generator`, which must be set before array genomes are made, since they draw from it.
+    `shape` is inputs, initial hidden nodes and outputs; so many genomes at least survive a generation. Its
+    `genome_config` has more attributes: settings of ours, and `generator`, which must be set before array genomes are
+    made, since they draw from it.
     """
     inputs, hidden, outputs = shape
     config = neat.Config.__new__(neat.Config)
@@ -154,6 +185,7 @@ def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, 
     config.reproduction_config = _parsed(
         SteadyReproduction, settings, ["elitism", "survival_threshold", "min_species_size"]
     )
+    config.reproduction_config.survivors = survivors
     config.genome_config = _parsed(
         neat.DefaultGenome,
         settings,
@@ -166,7 +198,10 @@ def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, 
         weight_min_value=-settings.weight_max_value,
         bias_min_value=-settings.bias_max_value,
     )
-    config.genome_config.positive_start, config.genome_config.generator = settings.positive_start, None
+    config.genome_config.generator = None
+    for name in _OURS:
+        setattr(config.genome_config, name, getattr(settings, name))
+    config.genome_config.output_activation = settings.output_activation or settings.activation_default
     return config
 
 

@@ -7,13 +7,20 @@ import math
 from dataclasses import dataclass
 
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
-from exneat_cli.errors import check_choice, check_flag, check_real, check_whole
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
 
 INITIAL_CONNECTIONS = ("full_nodirect", "full_direct", "unconnected", "fs_neat_nohidden", "fs_neat_hidden")
 """neat-python's names; ``fs_neat`` connects one input (Whiteson et al., "Automatic feature selection in
 neuroevolution", 2005)."""
 
-_CHOICES = {"genome": ("array", "stock"), "activation_default": ACTIVATIONS, "initial_connection": INITIAL_CONNECTIONS}
+_CHOICES = {
+    "genome": ("array", "stock"),
+    "activation_default": ACTIVATIONS,
+    "output_activation": ACTIVATIONS,
+    "initial_connection": INITIAL_CONNECTIONS,
+    "mutation": ("fixed", "adaptive"),
+    "parent_selection": ("uniform", "rank"),
+}
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
 _SHARES = ("_rate", "_prob", "survival_threshold")
 """Endings of the names of what is a probability; other real numbers are only not negative."""
@@ -31,13 +38,18 @@ class EvolutionSettings:
             other random numbers.
         feed_forward: feed-forward networks, else recurrent ones.
         activation_default: of every node, with neat-python's scaling, e.g. tanh(2.5 x).
+        output_activation: of outputs, if other than that; ``clamped`` is x cut to [-1, 1].
         initial_connection: connections of the first generation.
         neat_hidden, module_hidden: initial hidden nodes of NEAT's network, and of every ExNEAT module.
         positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
+        mutation: ``fixed`` power, or ``adaptive``: every genome carries a weight_mutate_power of its own, inherits and
+            varies it between weight_mutate_power_min and weight_mutate_power_max; bias_mutate_power goes along.
         weight_*, bias_*: initial values are N(0, init_stdev); a mutation adds N(0, mutate_power) to the share
             mutate_rate and draws the share replace_rate anew; values stay in [-max_value, max_value].
         enabled_mutate_rate: share of connections whose enabled flag a mutation draws anew.
         conn_add_prob, conn_delete_prob, node_add_prob, node_delete_prob: chance of each structural mutation.
+        crossover_prob: share of children with two parents; neat-python's way is 1.
+        parent_selection: ``uniform`` among those that may have offspring, as in neat-python, or by ``rank``.
         compatibility_disjoint_coefficient, compatibility_weight_coefficient: of the genetic distance.
         compatibility_threshold: genomes closer than this share a species.
         elitism: best genomes of a species that survive unchanged.
@@ -53,12 +65,16 @@ class EvolutionSettings:
     genome: str = "array"
     feed_forward: bool = True
     activation_default: str = "tanh"
+    output_activation: str | None = None
     initial_connection: str = "full_nodirect"
     neat_hidden: int = 6
     module_hidden: int = 4
     positive_start: bool = False
+    mutation: str = "fixed"
     weight_init_stdev: float = 0.12
     weight_mutate_power: float = 0.08
+    weight_mutate_power_min: float = 0.0
+    weight_mutate_power_max: float = 12.0
     weight_mutate_rate: float = 0.8
     weight_replace_rate: float = 0.1
     weight_max_value: float = 12.0
@@ -72,6 +88,8 @@ class EvolutionSettings:
     conn_delete_prob: float = 0.1
     node_add_prob: float = 0.1
     node_delete_prob: float = 0.1
+    crossover_prob: float = 1.0
+    parent_selection: str = "uniform"
     compatibility_disjoint_coefficient: float = 1.0
     compatibility_weight_coefficient: float = 1.25
     compatibility_threshold: float = 3.0
@@ -85,6 +103,8 @@ class EvolutionSettings:
         for field in dataclasses.fields(self):
             name, value = field.name, getattr(self, field.name)
             key = f"evolution.{name}"
+            if name == "output_activation" and value is None:
+                continue
             if name in _CHOICES:
                 check_choice(key, value, _CHOICES[name])
             elif isinstance(field.default, bool):
@@ -95,6 +115,21 @@ class EvolutionSettings:
                 check_whole(key, value, 0, 10_000)
             else:
                 check_real(key, value, 0.0, 1.0 if name.endswith(_SHARES) else math.inf)
+        self._check_together()
+
+    def _check_together(self) -> None:
+        """Refuse what only array genomes can do, and bounds that do not hold the first mutation power."""
+        ours = {"mutation": "fixed", "crossover_prob": 1.0, "parent_selection": "uniform"}
+        for name, stock in ours.items():
+            came = getattr(self, name)
+            if self.genome == "stock" and came != stock:
+                raise ConfigError(f"evolution.{name}", f"{stock} with genome=stock", came, "use genome=array")
+        if self.mutation == "adaptive":
+            lowest, highest = self.weight_mutate_power_min, self.weight_mutate_power_max
+            if not 0.0 < lowest <= self.weight_mutate_power <= highest:
+                expected = "0 < weight_mutate_power_min <= weight_mutate_power <= weight_mutate_power_max"
+                powers = f"{lowest:g}, {self.weight_mutate_power:g}, {highest:g}"
+                raise ConfigError("evolution.weight_mutate_power", expected, powers, "of mutation=adaptive")
 
 
 RECURRENT = EvolutionSettings(

@@ -15,7 +15,14 @@ from numpy.random import PCG64, Generator, SeedSequence
 from exneat_cli.algorithms.algorithm import State
 from exneat_cli.algorithms.neat.conversion import Columns, from_stock, pack, unpack
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.neat_python import LARGEST_ID, SteadyReproduction, counter, drawing_from, peek
+from exneat_cli.algorithms.neat.neat_python import (
+    LARGEST_ID,
+    RankedParents,
+    SteadyReproduction,
+    counter,
+    drawing_from,
+    peek,
+)
 from exneat_cli.seeding import generator_in
 
 
@@ -44,7 +51,7 @@ class Subpopulation:
     def _equip(self, config: neat.Config) -> None:
         self.config = config
         self._in_arrays = config.genome_type is ArrayGenome
-        self._chance = random.Random()
+        self._chance = RankedParents() if config.genome_config.parent_selection == "rank" else random.Random()
         reporters = ReporterSet()
         stagnation = neat.DefaultStagnation(config.stagnation_config, reporters)
         self._reproduction = SteadyReproduction(config.reproduction_config, reporters, stagnation)
@@ -60,6 +67,11 @@ class Subpopulation:
     def species_count(self) -> int:
         """Number of species in the current generation."""
         return len(self._species.species)
+
+    @property
+    def first_parents(self) -> dict[int, int]:
+        """Of each of the last generation's offspring, by id, the id of the first parent."""
+        return self._reproduction.first_parents
 
     def in_arrays(self, key: int) -> ArrayGenome:
         """The genome with this id, whatever the configuration's class is."""
@@ -114,6 +126,8 @@ class Subpopulation:
         own._equip(config)
         shape = items.num_inputs, items.num_hidden, items.num_outputs
         genomes = unpack(columns, prefix, shape, feed_forward=items.feed_forward, stock=not own._in_arrays)
+        if (items.mutation == "adaptive") != (f"{prefix}.power" in columns):
+            raise ValueError(f"{prefix}.power: expected mutation powers where mutation is adaptive, and only there")
         if len(genomes) != config.pop_size:
             raise ValueError(f"expected {config.pop_size} genomes, got {len(genomes)}")
         own.genomes = {genome.key: genome for genome in genomes}

@@ -191,6 +191,14 @@ class RobotTask(Task):
         """Forward and healthy reward less the costs of effort and contact."""
         return np.asarray(np.sum(totals, axis=-1))
 
+    def metres_of(self, fitness: float) -> float:
+        """Distance along x that an episode with this forward reward led (m)."""
+        return fitness / rules_of(self.model).forward_weight * self.seconds_of(1)
+
+    def seconds_of(self, steps: float) -> float:
+        """What so many control steps take (s)."""
+        return steps * float(load(self.model).opt.timestep) * self._substeps
+
     def open(self, *, training: bool) -> Simulation:
         """Open a new world with the model's own noise on the initial pose."""
         return self.open_disturbed(training=training, reset_scale=self.usual_reset_scale())

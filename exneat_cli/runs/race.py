@@ -1,0 +1,54 @@
+"""Who of several teams is the best on validation episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from exneat_cli.brains import Brains
+from exneat_cli.rollouts import Outcomes, Runner
+from exneat_cli.seeding import EpisodeSeeds
+
+FIRST_ROUND = 2
+"""Episodes of every team in the first round of a race."""
+
+_FIGURES: Any = ("fitness", "full_reward", "steps", "failed")
+
+
+def race(
+    runner: Runner, brains: Sequence[Brains], episodes: Sequence[EpisodeSeeds], first: int = FIRST_ROUND
+) -> tuple[int, list[Outcomes]]:
+    """Let brains race by successive halving: the better half of a round goes on with twice as many episodes.
+
+    Few episodes are enough to drop the worst ones, and the last ones get them all. Source: Karnin, Koren and Somekh,
+    "Almost optimal exploration in multi-armed bandits", ICML 2013.
+
+    Args:
+        runner: of the episodes.
+        brains: of one team each, at least one.
+        episodes: the same for all of them; who runs in a round runs the next ones in this order.
+        first: episodes of the first round; as many as there are make one round for all.
+
+    Returns:
+        The index of the best mean, of equals the first one, and what every brain got until it was dropped.
+    """
+    got: list[list[Outcomes]] = [[] for _ in brains]
+    running, done, to = list(range(len(brains))), 0, min(first, len(episodes))
+    while True:
+        outcomes = runner.run([brains[k] for k in running], episodes[done:to])
+        for row, k in enumerate(running):
+            got[k].append(Outcomes(*(getattr(outcomes, name)[row : row + 1] for name in _FIGURES)))
+        running.sort(key=lambda k: (-float(_joined(got[k]).fitness.mean()), k))
+        if to == len(episodes):
+            break
+        running = sorted(running[: (len(running) + 1) // 2])
+        done, to = to, min(2 * to, len(episodes))
+    return running[0], [_joined(parts) for parts in got]
+
+
+def _joined(parts: Sequence[Outcomes]) -> Outcomes:
+    """All episodes of one brain."""
+    figures: Any = [np.concatenate([getattr(each, name) for each in parts], axis=1) for name in _FIGURES]
+    return Outcomes(*figures)
