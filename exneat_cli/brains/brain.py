@@ -135,4 +135,6 @@ def _activation(code, value):  # type: ignore[no-untyped-def]
         return value if value > 0.0 else 0.0
     if code == 2:
         return 1.0 / (1.0 + math.exp(-max(-60.0, min(60.0, 5.0 * value))))
+    if code == 4:
+        return max(-1.0, min(1.0, value))
     return value

@@ -148,6 +148,8 @@ class RunSettings:
         plain["task"] = {**self.task.identity(), **({} if self.task_kind is None else {"kind": self.task_kind})}
         if self.wiring.trunk == Wiring().trunk:  # came later: runs without it keep their hashes
             del plain["wiring"]["trunk"]
+        if self.evolution.output_activation is None:
+            del plain["evolution"]["output_activation"]
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled
 
-ACTIVATIONS = ("tanh", "relu", "sigmoid", "identity")
+ACTIVATIONS = ("tanh", "relu", "sigmoid", "identity", "clamped")
 """neat-python's names; a node gene holds the index."""
 
 NODE = np.dtype(

@@ -71,6 +71,7 @@ class ArrayGenome:
         self.nodes["bias"] = _initial(number(config, "bias"), self.nodes.size, rng)
         self.nodes["response"] = _initial(number(config, "response"), self.nodes.size, rng)
         self.nodes["activation"] = ACTIVATIONS.index(config.activation_default)
+        self.nodes["activation"][: config.num_outputs] = ACTIVATIONS.index(config.output_activation)
         self.connections = _initial_connections(config)
         weights = _initial(number(config, "weight"), self.connections.size, rng)
         self.connections["weight"] = np.abs(weights) if config.positive_start else weights

@@ -97,9 +97,11 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
         genome_config.node_indexer = itertools.cycle(range(first, first + hidden))
         genomes: dict[int, Any] = super().create_new(genome_type, genome_config, num_genomes)
         genome_config.node_indexer = later_nodes
-        if genome_config.positive_start and issubclass(genome_type, neat.DefaultGenome):
+        if issubclass(genome_type, neat.DefaultGenome):
             for genome in genomes.values():
-                for gene in genome.connections.values():
+                for key in genome_config.output_keys:
+                    genome.nodes[key].activation = genome_config.output_activation
+                for gene in genome.connections.values() if genome_config.positive_start else ():
                     gene.weight = abs(gene.weight)
         return genomes
 
@@ -167,6 +169,7 @@ def neat_config(settings: EvolutionSettings, population: int, shape: tuple[int, 
         bias_min_value=-settings.bias_max_value,
     )
     config.genome_config.positive_start, config.genome_config.generator = settings.positive_start, None
+    config.genome_config.output_activation = settings.output_activation or settings.activation_default
     return config
 
 

@@ -13,7 +13,12 @@ INITIAL_CONNECTIONS = ("full_nodirect", "full_direct", "unconnected", "fs_neat_n
 """neat-python's names; ``fs_neat`` connects one input (Whiteson et al., "Automatic feature selection in
 neuroevolution", 2005)."""
 
-_CHOICES = {"genome": ("array", "stock"), "activation_default": ACTIVATIONS, "initial_connection": INITIAL_CONNECTIONS}
+_CHOICES = {
+    "genome": ("array", "stock"),
+    "activation_default": ACTIVATIONS,
+    "output_activation": ACTIVATIONS,
+    "initial_connection": INITIAL_CONNECTIONS,
+}
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
 _SHARES = ("_rate", "_prob", "survival_threshold")
 """Endings of the names of what is a probability; other real numbers are only not negative."""
@@ -31,6 +36,7 @@ class EvolutionSettings:
             other random numbers.
         feed_forward: feed-forward networks, else recurrent ones.
         activation_default: of every node, with neat-python's scaling, e.g. tanh(2.5 x).
+        output_activation: of outputs, if other than that; ``clamped`` is x cut to [-1, 1].
         initial_connection: connections of the first generation.
         neat_hidden, module_hidden: initial hidden nodes of NEAT's network, and of every ExNEAT module.
         positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
@@ -53,6 +59,7 @@ class EvolutionSettings:
     genome: str = "array"
     feed_forward: bool = True
     activation_default: str = "tanh"
+    output_activation: str | None = None
     initial_connection: str = "full_nodirect"
     neat_hidden: int = 6
     module_hidden: int = 4
@@ -85,6 +92,8 @@ class EvolutionSettings:
         for field in dataclasses.fields(self):
             name, value = field.name, getattr(self, field.name)
             key = f"evolution.{name}"
+            if name == "output_activation" and value is None:
+                continue
             if name in _CHOICES:
                 check_choice(key, value, _CHOICES[name])
             elif isinstance(field.default, bool):
