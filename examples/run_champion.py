@@ -12,6 +12,7 @@ import numpy as np
 
 ACTIVATIONS = {"tanh": lambda z: np.tanh(2.5 * z), "relu": lambda z: max(z, 0.0), "identity": lambda z: z}
 ACTIVATIONS["sigmoid"] = lambda z: 1.0 / (1.0 + np.exp(-np.clip(5.0 * z, -60.0, 60.0)))
+ACTIVATIONS["clamped"] = lambda z: min(max(z, -1.0), 1.0)
 
 
 class Champion:

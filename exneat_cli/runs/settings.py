@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT
+from exneat_cli.algorithms import ALGORITHMS, PAIRINGS, RECURRENT, Algorithm, EvolutionSettings, ExNEAT, Problem
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
@@ -75,10 +75,10 @@ class RunSettings:
     def __post_init__(self) -> None:
         if not is_ours(self.task):
             check_description(self.task)
-        if self.evolution is None:
-            object.__setattr__(self, "evolution", _suiting(self.task))
         if isinstance(self.algorithm, str):
             object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
+        if self.evolution is None:
+            object.__setattr__(self, "evolution", self.algorithm.usual_evolution(_suiting(self.task)))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -93,7 +93,7 @@ class RunSettings:
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         self._settle()
-        _ = self.plan
+        self.algorithm.check(self.problem)
 
     def _settle(self) -> None:
         """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
@@ -111,6 +111,18 @@ class RunSettings:
     def plan(self) -> Plan:
         """Who senses and drives what."""
         return self.algorithm.plan(self.task, self.geometry, self.linkage, self.wiring, self.evolution)
+
+    @property
+    def problem(self) -> Problem:
+        """What the algorithm is to solve."""
+        return Problem(
+            plan=self.plan,
+            evolution=self.evolution,
+            population=self.population,
+            episodes=self.episodes,
+            pairing=self.pairing,
+            seed=self.seed,
+        )
 
     @property
     def variant(self) -> str:
@@ -148,6 +160,7 @@ class RunSettings:
         plain["task"] = {**self.task.identity(), **({} if self.task_kind is None else {"kind": self.task_kind})}
         if self.wiring.trunk == Wiring().trunk:  # came later: runs without it keep their hashes
             del plain["wiring"]["trunk"]
+        plain["evolution"] = self.algorithm.identity_of(self.evolution)
         if self.evolution.output_activation is None:
             del plain["evolution"]["output_activation"]
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
@@ -173,7 +186,8 @@ class RunSettings:
         algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
         chosen: dict[str, Any] = {"task": task, "task_kind": kind, "algorithm": algorithm}
         if "evolution" in plain:
-            chosen["evolution"] = {**asdict(_suiting(task)), **check_section("evolution", plain["evolution"])}
+            usual = asdict(algorithm.usual_evolution(_suiting(task)))
+            chosen["evolution"] = {**usual, **check_section("evolution", plain["evolution"])}
         return build(cls, {**plain, **chosen})
 
 
