@@ -21,6 +21,7 @@ FENCES = {
     "mujoco_warp": {"tasks"},
     "warp": {"tasks", "brains", "rollouts"},
     "neat": {"algorithms", "brains"},
+    "cmaes": {"algorithms"},
     "matplotlib": {"analysis"},
     "jinja2": {"analysis"},
     "dask": {"rollouts"},

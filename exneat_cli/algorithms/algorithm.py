@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,13 +117,16 @@ class Algorithm(ABC):
     An algorithm that trains defines `start` and `restored`; one without training names a `rule`.
     """
 
-    modular: ClassVar[bool] = True
+    modular: bool = True
     """Whether geometry, linkage and wiring mean anything for it."""
-    wants_moments: ClassVar[bool] = False
-    """Whether it is told the statistics of what its networks sense, `Results.sensed`."""
 
     name: str
     """Its name in `conf/algorithm` and in run directories."""
+
+    @property
+    def wants_moments(self) -> bool:
+        """Whether it is told the statistics of what its networks sense, `Results.sensed`."""
+        return False
 
     @property
     def rule(self) -> str | None:
@@ -137,6 +140,21 @@ class Algorithm(ABC):
             ConfigError: the combination makes no sense.
         """
         return plan_modules(task, geometry, linkage, wiring, hidden=evolution.module_hidden)
+
+    def usual_evolution(self, evolution: EvolutionSettings) -> EvolutionSettings:
+        """Settings of evolution where the user gives none, from those that suit the task."""
+        return evolution
+
+    def identity_of(self, evolution: EvolutionSettings) -> dict[str, Any]:
+        """What its results depend on of these settings: what is hashed; two runs that differ elsewhere are the same."""
+        return asdict(evolution)
+
+    def check(self, problem: Problem) -> None:  # noqa: B027  # most take on any problem
+        """Refuse a problem that it cannot take on; called before anything is written.
+
+        Raises:
+            ConfigError: a setting makes no sense for it.
+        """
 
     def start(self, problem: Problem) -> Search:
         """Begin a search."""

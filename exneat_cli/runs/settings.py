@@ -17,6 +17,7 @@ from exneat_cli.algorithms import (
     Algorithm,
     EvolutionSettings,
     ExNEAT,
+    Problem,
 )
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
@@ -102,10 +103,10 @@ class RunSettings:
     def __post_init__(self) -> None:
         if not is_ours(self.task):
             check_description(self.task)
-        if self.evolution is None:
-            object.__setattr__(self, "evolution", _suiting(self.task))
         if isinstance(self.algorithm, str):
             object.__setattr__(self, "algorithm", _chosen(ALGORITHMS, "algorithm", {"name": self.algorithm}))
+        if self.evolution is None:
+            object.__setattr__(self, "evolution", self.algorithm.usual_evolution(_suiting(self.task)))
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_whole("generations", self.generations, 1)
         check_whole("population", self.population, 2, 1_000_000)
@@ -122,7 +123,7 @@ class RunSettings:
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         self._settle()
-        _ = self.plan
+        self.algorithm.check(self.problem)
 
     def _settle(self) -> None:
         """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
@@ -140,6 +141,20 @@ class RunSettings:
     def plan(self) -> Plan:
         """Who senses and drives what."""
         return self.algorithm.plan(self.task, self.geometry, self.linkage, self.wiring, self.evolution)
+
+    @property
+    def problem(self) -> Problem:
+        """What the algorithm is to solve."""
+        return Problem(
+            plan=self.plan,
+            evolution=self.evolution,
+            population=self.population,
+            episodes=self.episodes,
+            pairing=self.pairing,
+            seed=self.seed,
+            judging=self.judging,
+            champion=self.champion,
+        )
 
     @property
     def variant(self) -> str:
@@ -175,10 +190,11 @@ class RunSettings:
         """What is hashed: the settings with defaults that depend on the task spelled out."""
         plain = self.to_plain()
         plain["task"] = {**self.task.identity(), **({} if self.task_kind is None else {"kind": self.task_kind})}
+        plain["evolution"] = self.algorithm.identity_of(self.evolution)
         for section, name, before in _CAME_LATER:
             own = plain[section] if section else plain
-            if own[name] == before:
-                del own[name]
+            if own.get(name) == before:
+                own.pop(name, None)
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))
@@ -202,7 +218,8 @@ class RunSettings:
         algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
         chosen: dict[str, Any] = {"task": task, "task_kind": kind, "algorithm": algorithm}
         if "evolution" in plain:
-            chosen["evolution"] = {**asdict(_suiting(task)), **check_section("evolution", plain["evolution"])}
+            usual = asdict(algorithm.usual_evolution(_suiting(task)))
+            chosen["evolution"] = {**usual, **check_section("evolution", plain["evolution"])}
         return build(cls, {**plain, **chosen})
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exneat_cli.algorithms import Problem, Results, Search, State, Team, pack_teams, unpack_teams
+from exneat_cli.algorithms import Results, Search, State, Team, pack_teams, unpack_teams
 from exneat_cli.brains import assemble
 from exneat_cli.records import HISTORY_COLUMNS, HistoryRow
 from exneat_cli.rollouts import Outcomes, Runner
@@ -40,7 +40,7 @@ class Training:
     @classmethod
     def start(cls, settings: RunSettings) -> Training:
         """Begin with the first generation."""
-        return cls(settings, settings.algorithm.start(_problem(settings)))
+        return cls(settings, settings.algorithm.start(settings.problem))
 
     @classmethod
     def resumed(cls, settings: RunSettings, checkpoints: Iterable[State | str], say: Callable[[str], None]) -> Training:
@@ -65,7 +65,7 @@ class Training:
     @classmethod
     def _restored(cls, settings: RunSettings, checkpoint: State) -> Training:
         """The training that `checkpoint` was taken of, unless it is damaged or of other settings."""
-        problem, (plain, arrays) = _problem(settings), checkpoint
+        problem, (plain, arrays) = settings.problem, checkpoint
         history = [_sound(number, row) for number, row in enumerate(plain["history"], start=1)]
         if not 1 <= len(history) == plain["generation"] <= settings.generations:
             raise ValueError(f"expected at most {settings.generations} generations, got {len(history)}")
@@ -126,19 +126,6 @@ class Training:
         search, arrays = self.search.state()
         plain = {"generation": len(self.history), "search": search, "history": self.history}
         return plain, {**arrays, **pack_teams([self.first_generation], _FIRST)}
-
-
-def _problem(settings: RunSettings) -> Problem:
-    return Problem(
-        plan=settings.plan,
-        evolution=settings.evolution,
-        population=settings.population,
-        episodes=settings.episodes,
-        pairing=settings.pairing,
-        seed=settings.seed,
-        judging=settings.judging,
-        champion=settings.champion,
-    )
 
 
 def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:

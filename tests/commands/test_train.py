@@ -221,6 +221,16 @@ def test_the_defaults_in_conf_are_those_of_the_dataclasses(task: str) -> None:
     assert from_files == from_python
 
 
+@pytest.mark.parametrize("algorithm", ["ars", "openai_es", "cma_es"])
+@pytest.mark.parametrize("task", ["ant", "track_maze"])
+def test_the_defaults_of_an_evolution_strategy_in_conf_are_those_of_its_dataclass(task: str, algorithm: str) -> None:
+    line = read_command_line("train", [f"task={task}", f"algorithm={algorithm}"])
+    from_files, from_python = read_job("", line).settings, RunSettings(task=TASKS[task](), algorithm=algorithm)
+    assert from_files.algorithm == from_python.algorithm
+    identity_of = from_python.algorithm.identity_of
+    assert identity_of(from_files.evolution) == identity_of(from_python.evolution)
+
+
 def test_every_key_in_conf_carries_a_comment() -> None:
     bare = []
     for path in sorted(shipped_directory("conf").rglob("*.yaml")):

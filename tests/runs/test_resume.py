@@ -105,6 +105,20 @@ def test_a_run_that_stops_after_any_generation_ends_with_the_same_bytes(
         assert resumed(settings)[0] == undisturbed
 
 
+@pytest.mark.parametrize("algorithm", ["ars", "openai_es", "cma_es"])
+def test_an_evolution_strategy_on_ant_goes_on_and_is_made_longer_to_the_same_bytes(
+    tmp_path: Path, algorithm: str
+) -> None:
+    changes = {"algorithm": algorithm, "linkage": "output"}
+    undisturbed = content(train(ant(tmp_path / "undisturbed", **changes)).directory)
+    settings = ant(tmp_path / "stopped", **changes)
+    train_stopping(settings, "write_checkpoint", 3)
+    assert resumed(settings)[0] == undisturbed
+    shorter = ant(tmp_path / "longer", generations=2, **changes)
+    train(shorter)
+    assert resumed(shorter, generations=GENERATIONS)[0] == undisturbed
+
+
 def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     undisturbed = content(train(ant(tmp_path / "undisturbed")).directory)
     settings = ant(tmp_path / "stopped")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from exneat_cli.algorithms import ARS, EvolutionSettings
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Noise
 from exneat_cli.runs import RunSettings
@@ -38,6 +40,20 @@ def test_seeds_share_the_hash_in_the_directory_and_everything_else_changes_it() 
     assert short_hash(generations=3) == short_hash(), "a run may be made longer"
     for changes in ({"population": 3}, {"pairing": "index"}, {"task": AntTask(patience=3)}, {"linkage": "output"}):
         assert short_hash(**changes) != short_hash(), changes
+
+
+def test_what_means_nothing_for_an_evolution_strategy_is_no_part_of_its_hash() -> None:
+    def full_hash(**changes: Any) -> str:
+        evolution = replace(ARS().usual_evolution(EvolutionSettings()), **changes)
+        return RunSettings(algorithm="ars", evolution=evolution).full_hash
+
+    assert full_hash(conn_add_prob=0.9, weight_mutate_power=1.0, bias_init_stdev=9.0, neat_hidden=3) == full_hash()
+    for changes in (
+        {"module_hidden": 3},
+        {"output_activation": "tanh"},
+        {"bias_init_stdev": 0.0, "bias_mutate_rate": 0.0},
+    ):
+        assert full_hash(**changes) != full_hash(), changes
 
 
 def test_the_same_run_has_one_hash_however_it_is_written() -> None:

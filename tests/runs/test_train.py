@@ -84,7 +84,7 @@ def test_random_actions_are_tested_without_training(tmp_path: Path) -> None:
     assert finished.summary.startswith("No training: on 2 test episodes the baseline went ")
 
 
-@pytest.mark.parametrize("algorithm", ["exneat", "neat"])
+@pytest.mark.parametrize("algorithm", ["exneat", "neat", "ars", "openai_es", "cma_es"])
 def test_the_history_is_the_same_for_any_number_of_workers(tmp_path: Path, algorithm: str) -> None:
     rows = []
     for workers in (1, 2, 4):

@@ -1,0 +1,103 @@
+"""CMA-ES: samples from a normal distribution whose mean, step size and covariance follow the best of them.
+
+Sources: Hansen, "The CMA evolution strategy: a tutorial", 2016 (arXiv 1604.00772); of the separable kind, whose
+covariance is diagonal and whose cost grows with the weights alone, Ros and Hansen, "A simple modification in CMA-ES
+achieving linear time and space complexity", PPSN 2008. The updates are those of the library cmaes (Nomura and Shibata,
+"cmaes: a simple yet practical Python library for CMA-ES", arXiv 2402.01373): both kinds in NumPy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.random import SeedSequence
+
+from exneat_cli.algorithms.algorithm import Problem, State
+from exneat_cli.algorithms.ars import LEAST
+from exneat_cli.algorithms.evolution_strategy import EvolutionStrategy, Layout, Optimiser, Vectors, finite
+from exneat_cli.errors import ConfigError, check_choice, check_real
+
+LARGEST_FULL = 300
+"""Weights above which a full covariance matrix costs more than episodes do."""
+LEAST_POPULATION = 4
+_KINDS = ("full", "separable")
+
+
+class CovarianceAdaptation(Optimiser):
+    """The library at work; arguments as those of `CMAES`.
+
+    A library's state is its own affair: a resumed search is told again what the first one was, from the same seed.
+    """
+
+    def __init__(self, start: Vectors, population: int, seed: SeedSequence, sigma: float, *, full: bool) -> None:
+        from cmaes import CMA, SepCMA  # takes a second, which only those who use it should wait
+
+        kind: Any = CMA if full else SepCMA
+        number = int(seed.generate_state(1)[0])
+        self._library = kind(mean=start.copy(), sigma=float(sigma), population_size=population, seed=number)
+        self._told: list[Vectors] = []
+
+    @property
+    def centre(self) -> Vectors:  # type: ignore[override]
+        """The mean of the distribution."""
+        return np.array(self._library.mean)
+
+    def ask(self) -> Vectors:
+        """As the library draws them."""
+        self._samples = np.array([self._library.ask() for _ in range(self._library.population_size)])
+        return self._samples
+
+    def tell(self, fitness: Vectors) -> None:
+        """Tell the library, which looks for the lowest value."""
+        self._told.append(fitness)
+        self._library.tell(list(zip(self._samples, (-fitness).tolist(), strict=True)))
+
+    def state(self) -> State:
+        """All fitness so far."""
+        return {"updates": len(self._told)}, {"told": np.array(self._told)}
+
+    def restore(self, state: State) -> None:
+        """Do all updates again."""
+        plain, columns = state
+        for fitness in finite(columns, "told", (int(plain["updates"]), self._library.population_size)):
+            self.ask()
+            self.tell(fitness)
+
+
+@dataclass(frozen=True)
+class CMAES(EvolutionStrategy):
+    """Settings of CMA-ES.
+
+    Attributes:
+        sigma: the first step size, the sd of what a sample adds to each weight, at least 1e-6.
+        covariance: ``full``, for at most 300 weights and biases, or ``separable``; None takes what fits.
+
+    Raises:
+        ConfigError: a value is out of range.
+    """
+
+    name: str = "cma_es"
+    sigma: float = 0.05
+    covariance: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_real("algorithm.sigma", self.sigma, LEAST)
+        if self.covariance is not None:
+            check_choice("algorithm.covariance", self.covariance, _KINDS)
+
+    def check(self, problem: Problem) -> None:
+        """Refuse too small a population, and full matrices that are too large, too."""
+        super().check(problem)
+        if problem.population < LEAST_POPULATION:
+            raise ConfigError("population", f"at least {LEAST_POPULATION} for cma_es", problem.population)
+        if self.covariance == "full" and (size := Layout(problem).size) > LARGEST_FULL:
+            fix = f"these networks have {size} weights and biases: use algorithm.covariance=separable"
+            raise ConfigError("algorithm.covariance", f"full for at most {LARGEST_FULL} weights", "full", fix)
+
+    def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:
+        """CMA-ES from there."""
+        full = len(start) <= LARGEST_FULL if self.covariance is None else self.covariance == "full"
+        return CovarianceAdaptation(start, population, seed, self.sigma, full=full)

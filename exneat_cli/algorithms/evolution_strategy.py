@@ -1,0 +1,357 @@
+"""What evolution strategies share: they move one vector, all weights and biases of a team, by the fitness of samples.
+
+The team is the initial genome of each subpopulation of the plan, so geometry, linkage, frame and central module mean
+what they mean for ExNEAT; its structure stays. An `Optimiser` holds the vector and knows nothing of networks; this file
+turns its samples into teams.
+
+Input normalisation: every sensor pin is taken as (x - mean) / sd, with the statistics of all that was sensed at it so
+far, pooled over the modules that share a genome (Mania et al., 2018, section 3.2). A network with biases can hold it in
+its own numbers: w / sd for the weight, and the bias less the sum of w mean / sd. So teams are ordinary ones.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import SeedSequence
+from numpy.typing import NDArray
+
+from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.neat.genes import CONNECTION, NODE
+from exneat_cli.algorithms.neat.genome import ArrayGenome
+from exneat_cli.algorithms.neat.neat_python import neat_config
+from exneat_cli.algorithms.neat.settings import EvolutionSettings
+from exneat_cli.algorithms.neat.subpopulation import Subpopulation
+from exneat_cli.errors import ConfigError, check_choice, check_flag
+from exneat_cli.seeding import generator, stream
+from exneat_cli.tasks import Task
+from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, merged, plan_body, refuse_modules
+
+LEAST_SD = 0.01
+"""In a pin's unit. One that hardly ever varies would be blown up when it does."""
+INITIAL_SD = 0.03
+"""Of weights, where there are hidden nodes; all 0, these would never learn. Without them weights begin at 0, as in
+Mania et al. (2018)."""
+RACERS = 32
+"""Most candidates."""
+_STARTS = ("full_direct", "full_nodirect")
+
+Vectors = NDArray[np.float64]
+
+
+class Optimiser(ABC):
+    """A search for the vector of highest fitness, in turns of `ask` and `tell`.
+
+    Attributes:
+        centre: (n,) where it is; each update puts a new array in its place.
+    """
+
+    centre: Vectors
+
+    @abstractmethod
+    def ask(self) -> Vectors:
+        """Samples around the centre, (population, n)."""
+
+    @abstractmethod
+    def tell(self, fitness: Vectors) -> None:
+        """Move by the finite fitness, (population,), of the last samples: more is better."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """All that the rest depends on, between `tell` and `ask`."""
+
+    @abstractmethod
+    def restore(self, state: State) -> None:
+        """Bring one that has just begun, from the same arguments, into this state.
+
+        Raises:
+            ArithmeticError, LookupError, TypeError, ValueError: it is none, or does not fit.
+        """
+
+
+@dataclass(frozen=True)
+class EvolutionStrategy(Algorithm):
+    """Settings that all evolution strategies have.
+
+    Attributes:
+        name: its name.
+        modular: a module for each part, as the geometry says; False: a single one for everything, as NEAT has.
+        normalise: whether inputs are normalised; None means where networks have biases.
+
+    Raises:
+        ConfigError: a value is out of range.
+    """
+
+    name: str = ""
+    modular: bool = True
+    normalise: bool | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("algorithm.name", self.name, [type(self).name])
+        check_flag("algorithm.modular", self.modular)
+        if self.normalise is not None:
+            check_flag("algorithm.normalise", self.normalise)
+
+    @property
+    def wants_moments(self) -> bool:
+        """Whether inputs may have to be normalised."""
+        return self.normalise is not False
+
+    def usual_evolution(self, evolution: EvolutionSettings) -> EvolutionSettings:
+        """Linear networks, whose outputs are cut to the controls' range."""
+        start = replace(evolution, initial_connection="full_direct", neat_hidden=0, module_hidden=0)
+        return replace(start, output_activation="clamped")
+
+    def identity_of(self, evolution: EvolutionSettings) -> dict[str, Any]:
+        """What makes the networks; how evolution changes them means nothing here."""
+        names = ("feed_forward", "activation_default", "output_activation", "initial_connection")
+        hidden = evolution.module_hidden if self.modular else evolution.neat_hidden
+        return {name: getattr(evolution, name) for name in names} | {"hidden": hidden, "biases": has_biases(evolution)}
+
+    def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
+        """That of ExNEAT, or of NEAT if it is not `modular`."""
+        if self.modular:
+            return super().plan(task, geometry, linkage, wiring, evolution)
+        refuse_modules(f"{self.name} algorithm.modular=false", geometry, linkage, wiring)
+        return plan_body(task, hidden=evolution.neat_hidden)
+
+    def check(self, problem: Problem) -> None:
+        """Refuse what an evolution strategy cannot do.
+
+        Raises:
+            ConfigError: networks do not begin fully connected, inputs are to be normalised without biases, or teams
+                are to be paired.
+        """
+        start = problem.evolution.initial_connection
+        if start not in _STARTS:
+            fix = f"algorithm={self.name} changes weights alone, so all connections are there at the start"
+            raise ConfigError("evolution.initial_connection", " or ".join(_STARTS), start, fix)
+        if self.normalise and not has_biases(problem.evolution):
+            fix = "a network holds the mean of its inputs in its biases: set evolution.bias_init_stdev above 0"
+            raise ConfigError("algorithm.normalise", "false for networks without biases", True, fix)
+        if problem.pairing != "rank":
+            fix = f"algorithm={self.name} has one team, nothing to pair"
+            raise ConfigError("pairing", "rank, its default", problem.pairing, fix)
+
+    @abstractmethod
+    def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:
+        """Begin at the vector `start`, (n,), with so many samples per update."""
+
+    def start(self, problem: Problem) -> Search:
+        """Begin at small weights."""
+        return StrategySearch(problem, self)
+
+    def restored(self, problem: Problem, state: State) -> Search:
+        """The search that `state` was taken of."""
+        search = StrategySearch(problem, self)
+        search.restore(state)
+        return search
+
+
+class MirroredStrategy(EvolutionStrategy):
+    """One whose samples come in pairs, on both sides of the centre."""
+
+    def check(self, problem: Problem) -> None:
+        """Refuse an odd population, too."""
+        super().check(problem)
+        if problem.population % 2:
+            fix = f"the samples of algorithm={self.name} come in pairs, one on each side of the centre"
+            raise ConfigError("population", "an even number", problem.population, fix)
+
+
+def has_biases(evolution: EvolutionSettings) -> bool:
+    """Whether evolution would ever give a node a bias."""
+    return evolution.bias_init_stdev > 0.0 or min(evolution.bias_mutate_rate, evolution.bias_mutate_power) > 0.0
+
+
+class Layout:
+    """Where a problem's vector has which weight: for each subpopulation those of connections, then biases if any.
+
+    Attributes:
+        with_biases: whether nodes have biases.
+        size: of the vector.
+        folded_size: of one that is folded, in which every node has a bias.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.with_biases = has_biases(problem.evolution)
+        self._genomes = []
+        for index, shape in enumerate(problem.plan.subpopulation_shapes):
+            config = neat_config(problem.evolution, 2, shape)
+            initial = Subpopulation(config, stream(problem.seed, "evolution", index))
+            self._genomes.append(initial.in_arrays(min(initial.genomes)))
+        weights = sum(len(genome.connections) for genome in self._genomes)
+        biases = sum(len(genome.nodes) for genome in self._genomes)
+        self.size, self.folded_size = weights + (biases if self.with_biases else 0), weights + biases
+
+    def folded(self, vectors: Vectors, sensed: Sequence[Moments]) -> Vectors:
+        """Vectors, (T, size), as networks hold them, (T, folded_size), with normalised inputs folded in.
+
+        `sensed` are the moments of each subpopulation's pins; pins that sensed nothing are taken as they are.
+        """
+        columns, first = [], 0
+        for genome, moments in zip(self._genomes, sensed, strict=True):
+            targets, sources = genome.connections["target"], genome.connections["source"]
+            last = first + len(sources)
+            mean, sd = _of_connections(sources, moments)
+            weights = vectors[:, first:last] / sd
+            biases = np.zeros((len(vectors), len(genome.nodes)))
+            first = last
+            if self.with_biases:
+                first = last + len(genome.nodes)
+                biases += vectors[:, last:first]
+                for row, key in enumerate(genome.nodes["key"]):
+                    into = targets == key
+                    biases[:, row] -= (weights[:, into] * mean[into]).sum(axis=1)
+            columns += [weights, biases]
+        return np.concatenate(columns, axis=1)
+
+    def teams(self, folded: Vectors, ids: Sequence[int]) -> list[Team]:
+        """The teams of vectors from `folded`, all of whose genomes have the team's id."""
+        members, first = [], 0
+        for genome in self._genomes:
+            last = first + len(genome.connections)
+            connections = np.zeros((len(folded), len(genome.connections)), CONNECTION)
+            connections[:] = genome.connections
+            connections["weight"] = folded[:, first:last]
+            nodes = np.zeros((len(folded), len(genome.nodes)), NODE)
+            nodes[:] = genome.nodes
+            first = last + len(genome.nodes)
+            nodes["bias"] = folded[:, last:first]
+            members.append([_genome(*genes) for genes in zip(ids, nodes, connections, strict=True)])
+        return [Team(own, (key,) * len(own)) for key, own in zip(ids, zip(*members, strict=True), strict=True)]
+
+
+def _genome(key: int, nodes: NDArray[np.void], connections: NDArray[np.void]) -> ArrayGenome:
+    genome = ArrayGenome(key)
+    genome.nodes, genome.connections = nodes, connections
+    return genome
+
+
+def _of_connections(sources: NDArray[np.int64], moments: Moments) -> tuple[Vectors, Vectors]:
+    """Mean and sd of what each connection reads: 0 and 1 where that is a node, or a pin that sensed nothing yet."""
+    counts, means, squares = moments
+    known = counts >= 2.0
+    sd = np.sqrt(np.divide(squares, counts, out=np.ones_like(counts), where=known))
+    pins = np.maximum(-1 - sources, 0)
+    mean_of, sd_of = np.where(known, means, 0.0)[pins], np.where(known, np.maximum(sd, LEAST_SD), 1.0)[pins]
+    return np.where(sources < 0, mean_of, 0.0), np.where(sources < 0, sd_of, 1.0)
+
+
+class StrategySearch(Search):
+    """An optimiser at work on the weights of a team; a generation is one update.
+
+    Candidates are its centres, each after an update and with the mean fitness of the samples that led there: many
+    episodes, so no lucky one decides, and none of them costs more. At most `RACERS`, the latest among them.
+    """
+
+    def __init__(self, problem: Problem, strategy: EvolutionStrategy) -> None:
+        self._problem, self._layout = problem, Layout(problem)
+        self._normalises = self._layout.with_biases if strategy.normalise is None else strategy.normalise
+        shapes, start = problem.plan.subpopulation_shapes, np.zeros(self._layout.size)
+        if any(hidden for _, hidden, _ in shapes):
+            draws = generator(stream(problem.seed, "evolution", len(shapes)))
+            start = INITIAL_SD * draws.standard_normal(len(start))
+        self._optimiser = strategy.optimiser(start, problem.population, stream(problem.seed, "evolution"))
+        self._moments = [Moments(*np.zeros((3, pins))) for pins, _, _ in shapes]
+        self._waiting = False
+        self._generation = 0
+        self._centres: list[tuple[float, int, Vectors]] = []  # fitness, generation, folded; the best first
+
+    def ask(self) -> tuple[list[Team], int]:
+        """A sample of each team around the centre."""
+        if self._waiting:
+            raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
+        self._waiting = True
+        folded = self._layout.folded(self._optimiser.ask(), self._moments)
+        first = self._generation * (self._problem.population + 1)  # the last id of a generation is its centre's
+        return self._layout.teams(folded, range(first, first + len(folded))), self._problem.episodes
+
+    def tell(self, results: Results) -> bool:
+        """Update; a team that failed counts as the worst."""
+        if not self._waiting:
+            raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
+        if len(results.fitness) != self._problem.population:
+            expected, came = self._problem.population, len(results.fitness)
+            raise ValueError(f"tell: expected {expected} fitness values, got {came}")
+        fitness = results.fitness.mean(axis=1)
+        if not np.isfinite(fitness).all():
+            raise ValueError(f"tell: expected finite fitness values, got {fitness.tolist()}")
+        self._waiting = False
+        self._optimiser.tell(np.where(results.failed, fitness.min(), fitness))
+        if self._normalises:
+            pairs = zip(self._moments, results.sensed, strict=True)
+            self._moments = [merged((before, new), before.counts.size) for before, new in pairs]
+        if not results.failed.all():
+            (centre,) = self._layout.folded(self._optimiser.centre[np.newaxis], self._moments)
+            self._remember(float(fitness[~results.failed].mean()), centre)
+        self._generation += 1
+        return True
+
+    def _remember(self, fitness: float, centre: Vectors) -> None:
+        latest = (fitness, self._generation, centre)
+        self._centres = sorted([*self._centres, latest], key=lambda entry: (-entry[0], entry[1]))
+        if len(self._centres) > RACERS:
+            worst = self._centres[-1] is latest
+            del self._centres[-2 if worst else -1]
+
+    def candidates(self) -> list[Candidate]:
+        """Its centres, see above."""
+        if not self._centres:
+            return []
+        fitness, generations, centres = zip(*self._centres, strict=True)
+        ids = [(generation + 1) * (self._problem.population + 1) - 1 for generation in generations]
+        teams = self._layout.teams(np.array(centres), ids)
+        return [Candidate(*entry) for entry in zip(teams, fitness, generations, strict=True)]
+
+    def state(self) -> State:
+        """Optimiser, statistics of the inputs, and centres.
+
+        Raises:
+            RuntimeError: the teams that were asked for were not told their fitness.
+        """
+        if self._waiting or not self._generation:
+            raise RuntimeError("state: expected ask() and tell(results) before it")
+        plain, arrays = self._optimiser.state()
+        columns = {f"optimiser.{name}": column for name, column in arrays.items()}
+        columns |= {f"moments.{index}": np.array(moments) for index, moments in enumerate(self._moments)}
+        columns["centres"] = np.array([centre for _, _, centre in self._centres])
+        entries = [[fitness, generation] for fitness, generation, _ in self._centres]
+        return {"generation": self._generation, "optimiser": plain, "centres": entries}, columns
+
+    def restore(self, state: State) -> None:
+        """Bring a search that has just begun into this state.
+
+        Raises:
+            ArithmeticError, LookupError, TypeError, ValueError: it is none, or does not fit.
+        """
+        plain, columns = state
+        self._generation = int(plain["generation"])
+        own = {name.removeprefix("optimiser."): column for name, column in columns.items()}
+        self._optimiser.restore((plain["optimiser"], own))
+        self._moments = [
+            Moments(*finite(columns, f"moments.{index}", (3, pins)))
+            for index, (pins, _, _) in enumerate(self._problem.plan.subpopulation_shapes)
+        ]
+        entries = plain["centres"]
+        centres = finite(columns, "centres", (len(entries), self._layout.folded_size)) if entries else ()
+        for (fitness, generation), centre in zip(entries, centres, strict=True):
+            if not np.isfinite(fitness) or not 0 <= generation < self._generation:
+                raise ValueError(f"expected a finite fitness in a generation before now, got {fitness}, {generation}")
+            self._centres.append((float(fitness), int(generation), centre))
+
+
+def finite(columns: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> Vectors:
+    """A column of finite numbers of this shape, from a file of anyone's.
+
+    Raises:
+        KeyError, ValueError: there is none.
+    """
+    column = columns[name]
+    if column.dtype != np.float64 or column.shape != shape or not np.isfinite(column).all():
+        raise ValueError(f"{name}: expected finite numbers, {shape}, got {column.dtype} {column.shape}")
+    return column
