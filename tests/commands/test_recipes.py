@@ -63,6 +63,14 @@ def test_a_recipe_wires_no_modules_where_an_algorithm_has_none(algorithm: str) -
     assert settings_of("task=hunting", f"algorithm={algorithm}").judging == "last"
 
 
+def test_what_differs_for_an_algorithm_counts_more_than_the_recipe_and_less_than_what_is_given() -> None:
+    assert settings_of().evolution.weight_mutate_power == 0.01
+    assert settings_of("algorithm=neat").evolution.weight_mutate_power == 0.005
+    chosen = settings_of("algorithm=neat", "evolution.weight_mutate_power=0.02").evolution
+    assert (chosen.weight_mutate_power, chosen.bias_mutate_power) == (0.02, 0.005)
+    assert settings_of("recipe=thesis", "algorithm=neat").evolution == RunSettings().evolution
+
+
 def test_later_settings_stay_out_of_the_hash_only_while_they_are_as_before() -> None:
     before = settings_of("recipe=thesis").full_hash
     for changed in ("judging=mean", "champion=race", "evolution.crossover_prob=0.5", "evolution.parent_selection=rank"):
