@@ -124,7 +124,7 @@ class EvolutionStrategy(Algorithm):
 
         Raises:
             ConfigError: networks do not begin fully connected, inputs are to be normalised without biases, or teams
-                are to be paired.
+                are to be paired or judged by earlier episodes.
         """
         start = problem.evolution.initial_connection
         if start not in _STARTS:
@@ -136,6 +136,9 @@ class EvolutionStrategy(Algorithm):
         if problem.pairing != "rank":
             fix = f"algorithm={self.name} has one team, nothing to pair"
             raise ConfigError("pairing", "rank, its default", problem.pairing, fix)
+        if problem.judging != "last":
+            fix = f"algorithm={self.name} asks for new teams in every generation, which have no earlier episodes"
+            raise ConfigError("judging", "last", problem.judging, fix)
 
     @abstractmethod
     def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:

@@ -134,6 +134,7 @@ TRAIN = {
     "algorithm=cma_es algorithm.sigma=0": "algorithm.sigma: expected",
     "algorithm=cma_es algorithm.covariance=full geometry=all evolution.module_hidden=4": "weights and biases: use",
     "algorithm=cma_es algorithm.covariance=block": "algorithm.covariance: expected one of full, separable",
+    "algorithm=ars judging=mean": "judging: expected last, got 'mean'",
     "algorithm=ars algorithm.modular=false geometry=all": "algorithm=ars algorithm.modular=false has no part modules",
     "algorithm=ars algorithm.modular=3": "algorithm.modular: expected true or false",
     "algorithm=ars pairing=index": "pairing: expected rank, its default",
