@@ -16,7 +16,7 @@ from exneat_cli.tasks import Task
 from exneat_cli.wiring import GEOMETRIES, Geometry, Module
 
 _WITH_TASKS = (
-    *("task", "algorithm", "linkage", "evolution", "recipe", "wiring", "judging", "champion"),
+    *("task", "algorithm", "linkage", "geometry", "evolution", "recipe", "wiring", "judging", "champion", "pairing"),
     *("budgets", "executor", "name"),
 )
 """What a task's file and its recipe set; of all that, only the task is shown."""
