@@ -221,3 +221,15 @@ class HasFullReward(Protocol):
 
     def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) the second figure that tests report."""
+
+
+@runtime_checkable
+class HasBatch(Protocol):
+    """A task of which many worlds run side by side on a GPU."""
+
+    def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
+        """Open `count` worlds on a device, with `room` times the usual room for contacts.
+
+        Raises:
+            ConfigError: they cannot run there.
+        """
