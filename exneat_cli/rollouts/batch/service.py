@@ -21,7 +21,7 @@ from exneat_cli.rollouts.settings import Executor, Noise
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import HasBatch, Task
 
-STEPS_AT_ONCE = 16
+STEPS_AT_ONCE = 8
 """Control steps between two looks at what has ended."""
 GATHERING_SECONDS = 0.02
 """How long an idle batch waits for requests of other runs before it begins."""

@@ -16,52 +16,45 @@ _PLANE = wp.constant(int(mujoco.mjtGeom.mjGEOM_PLANE))
 _CAPSULE = wp.constant(int(mujoco.mjtGeom.mjGEOM_CAPSULE))
 
 
-@wp.kernel
-def align_capsules(
-    found: wp.array(dtype=int),
-    world_of: wp.array(dtype=int),
-    geoms: wp.array(dtype=wp.vec2i),
-    kinds: wp.array(dtype=int),
-    rotations: wp.array2d(dtype=wp.mat33),
-    frames: wp.array(dtype=wp.mat33),
-):
-    """Turn the frames of contacts of capsules with planes along the capsules, as MuJoCo does.
+@wp.func
+def _aligned(rotation: wp.mat33, frame: wp.mat33):
+    """The frame of a contact of a capsule with a plane, turned along the capsule, as MuJoCo has it.
 
     MuJoCo Warp 4.0 leaves steep capsules out, and the pyramids that stand for cones of friction then differ.
     """
-    c = wp.tid()
-    if c >= wp.min(found[0], world_of.shape[0]):
-        return
-    plane, capsule = geoms[c][0], geoms[c][1]
-    if plane < 0 or capsule < 0:
-        return
-    if kinds[plane] != _PLANE or kinds[capsule] != _CAPSULE:
-        return
-    rotation, frame = rotations[world_of[c], capsule], frames[c]
     axis = wp.vec3(rotation[0, 2], rotation[1, 2], rotation[2, 2])
     normal = wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
     along = axis - normal * wp.dot(normal, axis)
     length = wp.length(along)
-    if length > 1.0e-6:
-        along = along / length
-        across = wp.cross(normal, along)
-        frames[c] = wp.matrix_from_rows(normal, along, across)
+    if length <= 1.0e-6:
+        return frame
+    along = along / length
+    return wp.matrix_from_rows(normal, along, wp.cross(normal, along))
 
 
 @wp.kernel
 def list_contacts(
     found: wp.array(dtype=int),
     world_of: wp.array(dtype=int),
+    geoms: wp.array(dtype=wp.vec2i),
+    kinds: wp.array(dtype=int),
+    rotations: wp.array2d(dtype=wp.mat33),
+    frames: wp.array(dtype=wp.mat33),
     counts: wp.array(dtype=int),
     listed: wp.array2d(dtype=int),
 ):
-    """Enter each contact of the pool into the list of its world."""
+    """Enter each contact of the pool into the list of its world, and put its frame right."""
     c = wp.tid()
-    if c < wp.min(found[0], world_of.shape[0]):
-        w = world_of[c]
-        k = wp.atomic_add(counts, w, 1)
-        if k < listed.shape[1]:
-            listed[w, k] = c
+    if c >= wp.min(found[0], world_of.shape[0]):
+        return
+    w = world_of[c]
+    k = wp.atomic_add(counts, w, 1)
+    if k < listed.shape[1]:
+        listed[w, k] = c
+    one, other = geoms[c][0], geoms[c][1]
+    if one >= 0 and other >= 0:
+        if kinds[one] == _PLANE and kinds[other] == _CAPSULE:
+            frames[c] = _aligned(rotations[w, other], frames[c])
 
 
 @wp.func

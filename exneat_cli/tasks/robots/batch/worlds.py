@@ -17,7 +17,7 @@ from exneat_cli.tasks.robots.batch import kernels, ordering
 from exneat_cli.tasks.robots.dynamics import RobotWorld, rewind
 from exneat_cli.tasks.task import Simulation
 
-CONTACTS, ROWS = 32, 128
+CONTACTS, ROWS = 32, 64
 """Room per world for contacts and for rows of constraints, unless a limit was exceeded and both are doubled."""
 _LACKS_ROOM = sum(mujoco_warp.OverflowType[name] for name in ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD"))
 """Bits of MuJoCo Warp's overflows that more room would have spared."""
@@ -62,12 +62,12 @@ class RobotWorlds:
         try:
             self.model = mujoco_warp.put_model(model)
             self.data = mujoco_warp.make_data(
-                model, nworld=count, nconmax=CONTACTS * room, njmax=max(ROWS, 8 * model.nv) * room
+                model, nworld=count, nconmax=CONTACTS * room, njmax=ROWS * room
             )
         except (NotImplementedError, ValueError) as error:
             raise ConfigError("task.model", "one that MuJoCo Warp can simulate", str(error)[:200]) from error
         self.model.opt.warn_overflow = 0
-        self.model.opt.deterministic = mujoco_warp.DeterminismType.ATOMICS
+        self.model.ncam = self.model.nlight = 0  # nobody looks
         self._cone = int(model.opt.cone)
         listed, rows = CONTACTS * room, self.data.njmax
         self._contacts = wp.zeros(count, dtype=int)
@@ -77,9 +77,8 @@ class RobotWorlds:
         # Rows of a sparse table have no fixed width: they stay as they come.
         self._sorts_rows = not self.model.is_sparse
         self._numbers = wp.zeros((count, rows if self._sorts_rows else 0, self.data.efc.J.shape[2] + 9), dtype=float)
-        self.model.callback.contactfilter = self._sort_contacts
-        if self._sorts_rows:
-            self.model.callback.control = self._sort_rows
+        self.model.callback.contactfilter = self._list_contacts
+        self.model.callback.control = self._sort
 
     def _describe(self, world: RobotWorld) -> None:
         count, model, f = self.count, self._model, world.frames
@@ -180,18 +179,19 @@ class RobotWorlds:
         bodies = [model.geom_bodyid, model.body_rootid, data.subtree_com, self.force]
         wp.launch(ordering.add_contact_forces, dim=self.count, inputs=[*values, *bodies])
 
-    def _sort_contacts(self, model: Any, data: Any) -> None:
+    def _list_contacts(self, model: Any, data: Any) -> None:
         contact = data.contact
-        frames = [model.geom_type, data.geom_xmat, contact.frame]
-        inputs = [data.nacon, contact.worldid, contact.geom, *frames]
-        wp.launch(ordering.align_capsules, dim=data.naconmax, inputs=inputs)
         self._contacts.zero_()
+        found = [data.nacon, contact.worldid, contact.geom, model.geom_type, data.geom_xmat, contact.frame]
         lists = [self._contacts, self._listed]
-        wp.launch(ordering.list_contacts, dim=data.naconmax, inputs=[data.nacon, contact.worldid, *lists])
-        wp.launch(ordering.sort_contacts, dim=self.count, inputs=[contact.geom, contact.geomcollisionid, *lists])
+        wp.launch(ordering.list_contacts, dim=data.naconmax, inputs=[*found, *lists])
 
-    def _sort_rows(self, model: Any, data: Any) -> None:
+    def _sort(self, model: Any, data: Any) -> None:
         efc, contact = data.efc, data.contact
+        ranks = [contact.geom, contact.geomcollisionid, self._contacts, self._listed]
+        wp.launch(ordering.sort_contacts, dim=self.count, inputs=ranks)
+        if not self._sorts_rows:
+            return
         counts = [data.ne, data.nf, data.nl, data.nefc, efc.type, efc.id, self._contacts, self._listed]
         outcome = [contact.dim, self._cone, contact.efc_address, self._order, self._moved]
         wp.launch(ordering.order_rows, dim=self.count, inputs=[*counts, *outcome])
