@@ -46,7 +46,7 @@ def actions_on_warp(brains: Brains, sensed: np.ndarray) -> np.ndarray:
         (AntTask(), None, "none", FEED_FORWARD),
         (AntTask(), "all", "full", FEED_FORWARD),
         (RobotTask(model="ant"), "single", "joints", FEED_FORWARD),
-        (AntTask(), "all", "full", busy(RECURRENT, activation_default="tanh", weight_init_stdev=0.1)),
+        (AntTask(), "all", "full", busy(RECURRENT, activation_default="sigmoid", weight_init_stdev=0.1)),
     ],
     ids=["neat", "all-full", "single-joints", "recurrent"],
 )

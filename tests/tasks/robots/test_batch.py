@@ -55,6 +55,7 @@ def test_worlds_on_warp_go_the_way_of_mujoco(model: str, frame: str) -> None:
     ]
     worlds = task.open_batch(WORLDS, "cpu", training=True, reset_scale=scale, room=1)
     flag = wp.zeros(1, dtype=int)
+    forces = np.array(["contact" in name for name in task.sensor_names])  # stiff: they change with the last bits
     worlds.begins.assign(np.arange(WORLDS, dtype=np.int32))
     worlds.status.fill_(RUNNING)
     worlds.reset(wp.array(worlds.starts(training_episodes(1, 0, WORLDS))))
@@ -70,7 +71,8 @@ def test_worlds_on_warp_go_the_way_of_mujoco(model: str, frame: str) -> None:
         terms, status = worlds.terms.numpy(), worlds.status.numpy()
         for w, steps in enumerate(expected):
             if step < len(steps):
-                np.testing.assert_allclose(felt[w], steps[step][0], rtol=1e-4, atol=1e-4)
+                expected_felt = steps[step][0]
+                np.testing.assert_array_less(np.abs(felt[w] - expected_felt), np.where(forces, 1e-3, 1e-4 * (1.0 + np.abs(expected_felt))))
                 assert status[w] == steps[step][2]
                 if status[w] != FAILED:
                     np.testing.assert_allclose(terms[w], steps[step][1], rtol=1e-4, atol=1e-4)
