@@ -94,7 +94,9 @@ class Executor:
             except PackageNotFoundError:
                 came = "none"
             if came.split(".")[:2] != wanted.split(".")[:2]:
-                raise ExneatError(f"executor=warp: expected {package} {wanted}, got {came}\n  pip install 'exneat[gpu]'")
+                raise ExneatError(
+                    f"executor=warp: expected {package} {wanted}, got {came}\n  pip install 'exneat[gpu]'"
+                )
         from exneat_cli.rollouts.batch.devices import find_device
 
         return find_device(self.device)

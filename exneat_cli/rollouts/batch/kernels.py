@@ -67,7 +67,7 @@ def take_jobs(
     begins[w] = -1
     if status[w] == _RUNNING:
         return
-    k = int(-1)
+    k = -1
     if jobs.head[0] < jobs.tail[0]:
         k = wp.atomic_add(jobs.head, 0, 1)
         if k >= jobs.tail[0]:
@@ -121,13 +121,7 @@ def _normals(first: wp.uint32, second: wp.uint32):
 
 
 @wp.kernel
-def disturb(
-    keys: wp.array2d(dtype=wp.uint32),
-    doing: Doing,
-    sd: float,
-    count: int,
-    readings: wp.array2d(dtype=float),
-):
+def disturb(keys: wp.array2d(dtype=wp.uint32), doing: Doing, sd: float, count: int, readings: wp.array2d(dtype=float)):
     """Add normal noise to four readings of one world."""
     w, block = wp.tid()
     if doing.brain[w] < 0:
@@ -147,9 +141,7 @@ def disturb(
 
 
 @wp.kernel
-def keep_count(
-    status: wp.array(dtype=int), terms: wp.array2d(dtype=float), doing: Doing, outcome: Outcome
-):
+def keep_count(status: wp.array(dtype=int), terms: wp.array2d(dtype=float), doing: Doing, outcome: Outcome):
     """Add what the step gave, and write down the episodes that ended with it."""
     w = wp.tid()
     if doing.brain[w] < 0:

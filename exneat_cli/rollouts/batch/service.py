@@ -11,7 +11,6 @@ import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from exneat_cli.brains import Brains
 from exneat_cli.errors import ExneatError
@@ -204,4 +203,3 @@ def _in_words(error: BaseException, device: str, worlds: int) -> BaseException:
         why = f"{device} has too little memory for {worlds} worlds"
         return ExneatError(f"executor=warp: {why}\n  set executor.worlds lower")
     return error
-

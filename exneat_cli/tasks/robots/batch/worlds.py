@@ -61,9 +61,7 @@ class RobotWorlds:
             raise ConfigError("task.model", "none with executor=warp, whose contact forces lack theirs", came)
         try:
             self.model = mujoco_warp.put_model(model)
-            self.data = mujoco_warp.make_data(
-                model, nworld=count, nconmax=CONTACTS * room, njmax=ROWS * room
-            )
+            self.data = mujoco_warp.make_data(model, nworld=count, nconmax=CONTACTS * room, njmax=ROWS * room)
         except (NotImplementedError, ValueError) as error:
             raise ConfigError("task.model", "one that MuJoCo Warp can simulate", str(error)[:200]) from error
         self.model.opt.warn_overflow = 0
