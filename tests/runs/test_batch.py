@@ -1,4 +1,4 @@
-"""Whole runs with executor=warp: bytes that depend neither on the batch nor on what else runs, and on no interruption."""
+"""Whole runs with executor=warp: their bytes depend on no batch, no other run and no interruption."""
 
 from __future__ import annotations
 

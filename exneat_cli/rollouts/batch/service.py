@@ -1,4 +1,4 @@
-"""Runs episodes in batches of worlds on one device, for all runs of this process that ask: worlds never wait for one run.
+"""Runs episodes in batches of worlds on one device, for all runs of this process together.
 
 One thread owns the device. Requests of one task and noise share a batch: each takes a slot, and worlds take jobs from
 all slots. What comes out depends on neither.
