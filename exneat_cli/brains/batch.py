@@ -54,7 +54,7 @@ def activate(
     first, last = programs.first_node[s, b], programs.first_node[s, b + 1]
     recurrent, scratch = programs.recurrent[s, b] != 0, programs.size[s, b] - first
     for node in range(first, last):
-        total = 0.0
+        total = float(0.0)
         for edge in range(programs.edge_start[s, node], programs.edge_start[s, node + 1]):
             total += memory[w, programs.edge_source[s, edge]] * programs.edge_weight[s, edge]
         value = _activation(programs.activation[s, node], programs.bias[s, node] + programs.response[s, node] * total)

@@ -38,7 +38,13 @@ from tests.bench.processes import measure_help, measure_memory, measure_smoke_tr
 from tests.bench.table import print_table, write_table
 from tests.bench.training_speed import compare_with_neat_python
 from tests.bench.two_threads import compare_threads, usable_cores
-from tests.bench.warp_speed import Sizes, compare_with_bare_steps, compare_with_cpu, measure_device_memory, measure_evolution
+from tests.bench.warp_speed import (
+    Sizes,
+    compare_with_bare_steps,
+    compare_with_cpu,
+    measure_device_memory,
+    measure_evolution,
+)
 from tests.bench.workload import find_workload
 
 SIZES = tuple(field.name for field in fields(Sizes))

@@ -67,7 +67,7 @@ def take_jobs(
     begins[w] = -1
     if status[w] == _RUNNING:
         return
-    k = -1
+    k = int(-1)
     if jobs.head[0] < jobs.tail[0]:
         k = wp.atomic_add(jobs.head, 0, 1)
         if k >= jobs.tail[0]:

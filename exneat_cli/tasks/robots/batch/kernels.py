@@ -90,7 +90,7 @@ def reset(
     row = begins[w]
     if row < 0:
         return
-    k = 0
+    k = int(0)
     for i in range(qpos.shape[1]):
         qpos[w, i] = starts[row, k]
         k += 1
@@ -150,7 +150,7 @@ def sense_joints(
 @wp.func
 def _rotation(view: View, readings: wp.array2d(dtype=float), w: int):
     """From the trunk's axes to the world's."""
-    a, b, c, d = 1.0, 0.0, 0.0, 0.0
+    a, b, c, d = float(1.0), float(0.0), float(0.0), float(0.0)
     if view.free != 0:
         a = readings[w, view.orientation]
         b = readings[w, view.orientation + 1]
@@ -271,7 +271,7 @@ def _place(
         return qpos[w, rules.along]
     if rules.total_mass == 0.0:
         return xpos[w, rules.trunk][0]
-    moment = 0.0
+    moment = float(0.0)
     for body in range(rules.masses.shape[0]):
         moment += rules.masses[body] * xipos[w, body][0]
     return moment / rules.total_mass
@@ -279,7 +279,7 @@ def _place(
 
 @wp.func
 def _contact_cost(rules: Rules, force: wp.array2d(dtype=wp.spatial_vector), w: int):
-    squared = 0.0
+    squared = float(0.0)
     if rules.contact_weight != 0.0:
         for body in range(force.shape[1]):
             for i in range(6):
@@ -313,7 +313,7 @@ def judge(
         return
     now = _place(rules, qpos, xpos, xipos, w)
     healthy = _is_healthy(rules, qpos, qvel, w)
-    effort = 0.0
+    effort = float(0.0)
     for i in range(ctrl.shape[1]):
         effort += ctrl[w, i] * ctrl[w, i]
     terms[w, 0] = rules.forward_weight * ((now - place[w]) / rules.control_period)

@@ -109,7 +109,7 @@ def order_rows(
     first_contact = equalities[w] + frictions[w] + limits[w]
     last = wp.min(rows[w], order.shape[1])
     first_contact = wp.min(first_contact, last)
-    changed = 0
+    changed = int(0)
     for i in range(first_contact):
         row = int(i)
         j = int(i)

@@ -50,6 +50,8 @@ class RobotWorlds:
         self.start_size = model.nq + 2 * model.nv + 2
         world: RobotWorld = simulation.world
         self._world, self.is_framed = world, simulation.sense is not None
+        self.model: Any = None
+        self.data: Any = None
         self._needs_forces = bool(world.bodies.size) or world.contact_weight != 0.0
         with wp.ScopedDevice(device):
             self._open(model, count, room)
@@ -107,7 +109,7 @@ class RobotWorlds:
         self._joints = _uploaded(f.scalar_from), _uploaded(f.scalar_to), _uploaded(f.scalar_sign)
         signs = f.action_signs if self.is_framed else np.ones(model.nu)
         self._drive = _uploaded(signs), _uploaded(world.middle), _uploaded(world.span)
-        names = [name for name in kernels.Rules.vars if name in world._fields]
+        names = [name for name in world._fields if name in kernels.Rules.vars]  # type: ignore[attr-defined]
         rules = {name: getattr(world, name) for name in names}
         self._rules = _filled(kernels.Rules(), **rules, total_mass=float(world.masses.sum()))
 
