@@ -45,21 +45,23 @@ class RobotWorlds:
         ConfigError: MuJoCo Warp cannot simulate the model.
     """
 
+    model: Any
+    data: Any
+
     def __init__(self, model: mujoco.MjModel, simulation: Simulation, count: int, device: str, room: int = 1) -> None:
         self.count, self._simulation, self._model = count, simulation, model
         self.start_size = model.nq + 2 * model.nv + 2
         world: RobotWorld = simulation.world
         self._world, self.is_framed = world, simulation.sense is not None
-        self.model: Any = None
-        self.data: Any = None
         self._needs_forces = bool(world.bodies.size) or world.contact_weight != 0.0
         with wp.ScopedDevice(device):
             self._open(model, count, room)
             self._describe(world)
 
     def _open(self, model: mujoco.MjModel, count: int, room: int) -> None:
-        if self._needs_forces and (model.neq or model.ntendon):
-            came = f"{model.neq} equality constraints, {model.ntendon} tendons"
+        spatial = int(np.sum(model.wrap_type != mujoco.mjtWrap.mjWRAP_JOINT))
+        if self._needs_forces and (model.neq or spatial):
+            came = f"{model.neq} equality constraints, {spatial} points of spatial tendons"
             raise ConfigError("task.model", "none with executor=warp, whose contact forces lack theirs", came)
         try:
             self.model = mujoco_warp.put_model(model)
@@ -173,7 +175,8 @@ class RobotWorlds:
         wp.launch(kernels.judge, dim=self.count, inputs=[self._rules, *state, *own])
 
     def _add_contact_forces(self) -> None:
-        contact, data, model = self.data.contact, self.data, self.model
+        data, model = self.data, self.model
+        contact = data.contact
         contacts = [contact.geom, contact.dim, contact.frame, contact.friction, contact.pos, contact.efc_address]
         values = [self._contacts, self._listed, *contacts, self._cone, data.efc.force]
         bodies = [model.geom_bodyid, model.body_rootid, data.subtree_com, self.force]
