@@ -35,7 +35,9 @@ class Sizes:
     """How much of it is measured.
 
     Attributes:
-        worlds: of the comparison with bare physics; as many episodes has a generation of whole evolution.
+        worlds: of the comparison with bare physics, and of whole evolution.
+        queued: episodes for each world in a generation of whole evolution: a run waits for its longest one, while others
+            that are shorter leave worlds to other runs.
         memory_worlds: of which the memory is measured.
         runs, generations, population: of the training side by side.
         cpu_runs: of the same on the CPU, whose test figures are compared.
@@ -44,6 +46,7 @@ class Sizes:
     """
 
     worlds: int = 4000
+    queued: int = 8
     memory_worlds: int = 5000
     runs: int = 10
     generations: int = 100
@@ -68,10 +71,11 @@ def settings_of(sizes: Sizes, seed: int, **changes: object) -> RunSettings:
 
 def measure_evolution(sizes: Sizes) -> Row:
     """Environment steps a second of runs side by side whose episodes fill the worlds, evolution and all."""
-    count = max(1, sizes.worlds // sizes.population)
+    count = max(1, sizes.queued * sizes.worlds // sizes.population)
+    executor = Executor("warp", worlds=sizes.worlds, device=sizes.device)
     trainings = [Training.start(settings_of(sizes, FIRST_SEED + k, generations=4)) for k in range(count)]
     with keep_workers(), ThreadPoolExecutor(count) as pool:
-        runners = [Runner(each.settings.task, each.settings.noise, sizes.executor, training=True) for each in trainings]
+        runners = [Runner(each.settings.task, each.settings.noise, executor, training=True) for each in trainings]
 
         def advance(k: int, generations: int) -> None:
             for _ in range(generations):

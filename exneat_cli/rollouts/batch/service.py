@@ -24,7 +24,7 @@ STEPS_AT_ONCE = 8
 """Control steps between two looks at what has ended."""
 GATHERING_SECONDS = 0.02
 """How long an idle batch waits for requests of other runs before it begins."""
-MOST_SLOTS = 256
+MOST_SLOTS = 512
 
 Setup = tuple[Task, Noise, bool]
 

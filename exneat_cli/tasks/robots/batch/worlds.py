@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import mujoco_warp
@@ -131,14 +131,14 @@ class RobotWorlds:
         return self._state()
 
     def _state(self) -> NDArray[np.float32]:
-        world, (_, data) = self._world, self._simulation.owner  # type: ignore[misc]
+        world, owner = self._world, cast("tuple[mujoco.MjModel, mujoco.MjData]", self._simulation.owner)
         x = world.xpos[world.trunk, 0]
         place = x
         if world.along >= 0:
             place = world.qpos[world.along]
         elif world.masses.size:
             place = float(world.masses @ world.xipos[:, 0]) / float(world.masses.sum())
-        return np.concatenate([world.qpos, world.qvel, data.qacc_warmstart, [place, x]]).astype(np.float32)
+        return np.concatenate([world.qpos, world.qvel, owner[1].qacc_warmstart, [place, x]]).astype(np.float32)
 
     def reset(self, starts: wp.array) -> None:
         """Put each world with `begins` >= 0 to that row of `starts`, (starts, `start_size`)."""
