@@ -36,8 +36,8 @@ class Sizes:
 
     Attributes:
         worlds: of the comparison with bare physics, and of whole evolution.
-        queued: episodes for each world in a generation of whole evolution: a run waits for its longest one, while others
-            that are shorter leave worlds to other runs.
+        queued: episodes for each world in a generation of whole evolution: a run waits for its longest one, and others
+            use its worlds meanwhile.
         memory_worlds: of which the memory is measured.
         runs, generations, population: of the training side by side.
         cpu_runs: of the same on the CPU, whose test figures are compared.
