@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_finished, run_robustness, train
 from exneat_cli.tasks.user_code import NAMED, code_in
 
+_one_at_a_time = threading.Lock()
+"""Runs that train side by side take turns at drawing, which has one state for the whole process."""
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
 _SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings) if f.name != "task_kind")
@@ -45,7 +48,8 @@ class Job:
             ExneatError: the run directory is unusable, or holds something else.
         """
         finished = train(self.settings, progress=progress, command=command, go_on=go_on)
-        self.test(finished.directory, self.settings.executor, progress)
+        with _one_at_a_time:
+            self.test(finished.directory, self.settings.executor, progress)
         return finished
 
     def test(self, directory: RunDirectory, executor: Executor, progress: Progress) -> int:

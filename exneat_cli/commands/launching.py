@@ -1,4 +1,4 @@
-"""Doing several jobs: here, one after the other, or side by side and on other machines by a launcher of Hydra's."""
+"""Doing several jobs: here, one after the other or together on a GPU, or elsewhere by a launcher of Hydra's."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ from exneat_cli.tasks import TASKS
 from exneat_cli.tasks.user_code import NAMED
 from exneat_cli.wiring import LINKAGES
 
+MOST_SIDE_BY_SIDE = 256
+"""So many runs train at once on one GPU."""
 _REGISTRIES: tuple[Any, ...] = (TASKS, ALGORITHMS, LINKAGES, NAMED)
 """What a program or its user may have added to, and a worker, which runs another program, must know too."""
 _WRITING_NOTHING = (
@@ -51,7 +54,13 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
     """
     if not line.launcher:
         with keep_workers():  # starting one takes seconds
-            return [_do(work, jobs, None, {"job": k}) for k in range(len(jobs))]
+            here = functools.partial(_do, work, jobs, None)
+            numbers = [{"job": k} for k in range(len(jobs))]
+            if all(job.settings.executor.name == "warp" for job in jobs):
+                # Their episodes share batches of worlds, which one run alone would not fill.
+                with ThreadPoolExecutor(MOST_SIDE_BY_SIDE, thread_name_prefix="run") as pool:
+                    return list(pool.map(here, numbers))
+            return list(map(here, numbers))
     with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
         known = [registry.copy() for registry in _REGISTRIES]
         here = functools.partial(_do_here, Path.cwd(), known, functools.partial(_do, work, jobs, Path(workplace)))

@@ -65,7 +65,7 @@ class Runner:
     Args:
         task: what is simulated.
         noise: what disturbs the agent.
-        executor: where; one world is opened for each thread.
+        executor: where; one world is opened for each thread. Of ``warp``, for training alone, else on all cores.
         training: switches on the task's early stopping.
 
     Raises:
@@ -73,6 +73,8 @@ class Runner:
     """
 
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
+        if executor.name == "warp" and not training:
+            executor = Executor()  # figures that count are those of double precision
         self._task, self._noise, self._executor, self._training = task, noise, executor, training
         self._halt = np.zeros(1, dtype=np.bool_)
         self._run = functools.partial(run_shares, task, noise, self._halt)
@@ -82,7 +84,7 @@ class Runner:
         with contextlib.ExitStack() as ending:
             ending.callback(self._pool.shutdown, cancel_futures=True)
             ending.callback(self._halt.fill, True)  # threads end before the next step of their episodes
-            if executor.name in ("processes", "dask"):
+            if executor.name in ("processes", "dask", "warp"):
                 ending.enter_context(keep_workers())
                 workers_of(executor)
             self._ending = ending.pop_all()

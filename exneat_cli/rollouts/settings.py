@@ -6,12 +6,16 @@ import dataclasses
 import os
 import re
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real, check_whole, is_finite
 from exneat_cli.tasks import HasInitialPose, Task
 
-EXECUTORS = ("threads", "serial", "processes", "dask")
+_GPU_PACKAGES = {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0"}
+"""What `exneat[gpu]` installs: results depend on their versions."""
+EXECUTORS = ("threads", "serial", "processes", "dask", "warp")
+_DEVICE = re.compile(r"cpu|cuda(:\d{1,2})?")
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
 
 
@@ -20,12 +24,14 @@ class Executor:
     """Where episodes run; results do not depend on it.
 
     Attributes:
-        name: ``threads``, ``serial`` for one thread, ``processes`` for worker processes on this machine, or ``dask``
-            for those of a cluster.
+        name: ``threads``, ``serial`` for one thread, ``processes`` for worker processes on this machine, ``dask``
+            for those of a cluster, or ``warp`` for training in batches of worlds on a GPU.
         workers: number of threads, or of processes with one thread each; 0 takes every core this process may
             use. A cluster at an address has workers of its own: 0 there.
         address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
             this machine.
+        worlds: of ``warp``, how many may be side by side on its device.
+        device: of ``warp``, ``cuda``, ``cuda:0``, ... or ``cpu``; None takes a GPU if there is one.
 
     Raises:
         ConfigError: a value is out of range, or makes no sense with this name.
@@ -34,10 +40,18 @@ class Executor:
     name: str = "threads"
     workers: int = 0
     address: str | None = None
+    worlds: int = 8192
+    device: str | None = None
 
     def __post_init__(self) -> None:
         check_choice("executor.name", self.name, EXECUTORS)
         check_whole("executor.workers", self.workers, 0, 1 if self.name == "serial" else 4096)
+        check_whole("executor.worlds", self.worlds, 1, 1_000_000)
+        if self.device is not None:
+            if self.name != "warp":
+                raise ConfigError("executor.device", f"none with executor={self.name}", self.device, "warp has one")
+            if not isinstance(self.device, str) or not _DEVICE.fullmatch(self.device):
+                raise ConfigError("executor.device", "null, cpu, cuda or cuda:<number>", self.device)
         if self.address is None:
             return
         if self.name != "dask":
@@ -60,10 +74,32 @@ class Executor:
         """Refuse to begin without the library that this executor needs.
 
         Raises:
-            ExneatError: it is dask, which is not installed.
+            ExneatError: it is not installed or of another version, or there is no such device.
         """
         if self.name == "dask" and find_spec("distributed") is None:
             raise ExneatError("executor=dask: expected dask, which is not installed\n  pip install 'exneat[dask]'")
+        if self.name == "warp":
+            _ = self.device_name
+
+    @property
+    def device_name(self) -> str:
+        """Warp's name of the device on which ``warp`` runs.
+
+        Raises:
+            ExneatError: MuJoCo Warp is not installed or of another version, or there is no such device.
+        """
+        for package, wanted in _GPU_PACKAGES.items():
+            try:
+                came = version(package)
+            except PackageNotFoundError:
+                came = "none"
+            if came.split(".")[:2] != wanted.split(".")[:2]:
+                raise ExneatError(
+                    f"executor=warp: expected {package} {wanted}, got {came}\n  pip install 'exneat[gpu]'"
+                )
+        from exneat_cli.rollouts.batch.devices import find_device
+
+        return find_device(self.device)
 
 
 def is_compiled(task: Task) -> bool:

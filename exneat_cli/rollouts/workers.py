@@ -1,16 +1,22 @@
-"""Worker processes that stay for the next runner: starting them takes seconds."""
+"""Worker processes, and batches on a GPU, that stay for the next runner: starting them takes seconds."""
 
 from __future__ import annotations
 
 import contextlib
 import threading
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, TypeAlias
 
 from exneat_cli.rollouts.cluster import Cluster
 from exneat_cli.rollouts.processes import Processes
 from exneat_cli.rollouts.settings import Executor
 
-_open: dict[Executor, Cluster | Processes] = {}
+if TYPE_CHECKING:
+    from exneat_cli.rollouts.batch.service import Batches
+
+Workers: TypeAlias = "Cluster | Processes | Batches"
+
+_open: dict[Executor, Workers] = {}
 _users = 0
 _lock = threading.RLock()
 
@@ -30,15 +36,25 @@ def keep_workers() -> Iterator[None]:
                 closing.callback(_open.popitem()[1].close)
 
 
-def workers_of(executor: Executor) -> Cluster | Processes:
+def workers_of(executor: Executor) -> Workers:
     """The workers of an executor that has some, those there are or new ones; within `keep_workers`.
 
     Raises:
-        ExneatError: dask is not installed, or nothing answers at the executor's address.
+        ExneatError: its library is not installed, nothing answers at its address, or there is no such device.
     """
     with _lock:
         if executor in _open and not _open[executor].is_usable:
             _open.pop(executor).close()
         if executor not in _open:
-            _open[executor] = Cluster(executor) if executor.name == "dask" else Processes(executor)
+            _open[executor] = _started(executor)
         return _open[executor]
+
+
+def _started(executor: Executor) -> Workers:
+    if executor.name == "dask":
+        return Cluster(executor)
+    if executor.name == "processes":
+        return Processes(executor)
+    from exneat_cli.rollouts.batch.service import Batches
+
+    return Batches(executor)

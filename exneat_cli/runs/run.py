@@ -81,7 +81,17 @@ def train(
                     result = choose_champion(training, directory, progress)
                 directory.update_manifest(status=DONE, finished=_now(), result=result)
         result = directory.read_result()
-    return Finished(directory, result, summary_sentence(settings.task, result), trained_now=not was_done)
+    summary = summary_sentence(settings.task, result) + _told_of_backend(settings, result)
+    return Finished(directory, result, summary, trained_now=not was_done)
+
+
+def _told_of_backend(settings: RunSettings, result: Result) -> str:
+    """What else to say of a run that was not trained in the precision that it was tested in."""
+    if settings.executor.name != "warp" or result.training is None:
+        return ""
+    device, digits = settings.executor.device_name, settings.task.fitness_decimals
+    earned = f"the best team earned {result.training:.{digits}f} in an episode of training"
+    return f" These are figures of the CPU in float64; on {device} in float32 {earned}."
 
 
 def _refuse_changed_files(settings: RunSettings, asked: Mapping[str, Any]) -> None:

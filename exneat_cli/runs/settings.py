@@ -22,7 +22,7 @@ from exneat_cli.algorithms import (
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
-from exneat_cli.tasks import TASKS, AntTask, HasInitialPose, Task
+from exneat_cli.tasks import TASKS, AntTask, HasBatch, HasInitialPose, Task
 from exneat_cli.tasks.contract import check_description, is_ours
 from exneat_cli.tasks.user_code import find_task
 from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
@@ -56,7 +56,7 @@ class RunSettings:
         geometry, linkage, wiring: how modules are wired.
         noise: what disturbs the agent, in training, validation and test alike.
         evolution: how genomes change and compete; left out, what suits the task's kind of network.
-        executor: where episodes run; without effect on results.
+        executor: where episodes run; without effect on results, but for ``warp`` and its device.
         seed: root of all random streams but those of validation and test.
         generations, population: of each subpopulation.
         episodes: training episodes per team and generation.
@@ -123,7 +123,17 @@ class RunSettings:
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         self._settle()
+        if self.executor.name == "warp":
+            self._check_batches()
         self.algorithm.check(self.problem)
+
+    def _check_batches(self) -> None:
+        """Refuse what does not run in batches on a GPU."""
+        if not isinstance(self.task, HasBatch):
+            raise ConfigError("executor", f"another one with task={self.task.name}", "warp", "only robots run there")
+        if self.algorithm.wants_moments:
+            fix = "executor=threads gathers the statistics of what is sensed, which it needs"
+            raise ConfigError("executor", f"another one with algorithm={self.algorithm.name}", "warp", fix)
 
     def _settle(self) -> None:
         """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
@@ -195,6 +205,9 @@ class RunSettings:
             own = plain[section] if section else plain
             if own.get(name) == before:
                 own.pop(name, None)
+        if self.executor.name == "warp":
+            kind = self.executor.device_name.partition(":")[0]
+            plain["backend"] = {"name": "warp", "device": kind, "precision": "float32"}
         plain["wiring"]["central"] = any(module.name == CENTRAL for module in self.plan.modules)
         if self.geometry.vector is not None:
             plain["geometry"]["vector"] = list(self.geometry.subpopulations(self.task.parts))

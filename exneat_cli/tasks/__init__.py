@@ -15,6 +15,7 @@ from exneat_cli.tasks.task import (
     ENDED,
     FAILED,
     RUNNING,
+    HasBatch,
     HasDistance,
     HasFullReward,
     HasInitialPose,

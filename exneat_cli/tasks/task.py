@@ -232,3 +232,15 @@ class HasDistance(Protocol):
 
     def seconds_of(self, steps: float) -> float:
         """What so many control steps take (s)."""
+
+
+@runtime_checkable
+class HasBatch(Protocol):
+    """A task of which many worlds run side by side on a GPU."""
+
+    def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
+        """Open `count` worlds on a device, with `room` times the usual room for contacts.
+
+        Raises:
+            ConfigError: they cannot run there.
+        """

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -37,8 +38,16 @@ from tests.bench.processes import measure_help, measure_memory, measure_smoke_tr
 from tests.bench.table import print_table, write_table
 from tests.bench.training_speed import compare_with_neat_python
 from tests.bench.two_threads import compare_threads, usable_cores
+from tests.bench.warp_speed import (
+    Sizes,
+    compare_with_bare_steps,
+    compare_with_cpu,
+    measure_device_memory,
+    measure_evolution,
+)
 from tests.bench.workload import find_workload
 
+SIZES = tuple(field.name for field in fields(Sizes))
 FOLDER = Path("outputs") / "bench"
 SINGLE_THREAD_EPISODES = 4
 THREADED_EPISODES = 16
@@ -52,7 +61,7 @@ def main() -> int:
     options = _options()
     versions = ", ".join(f"{name} {version}" for name, version in provenance.versions().items())
     print(f"{provenance.processor()}, {usable_cores()} cores; {versions}", flush=True)
-    for name in [options.only] if options.only else PARTS:
+    for name in [options.only] if options.only else (name for name in PARTS if name != "warp"):
         pieces, table = PARTS[name]
         try:
             rows = _measure(pieces(options))
@@ -76,7 +85,17 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--repetitions", type=_at_least_one, default=11, help="ant, grid: pairs of runs per ratio (default 11)"
     )
+    parser.add_argument(
+        "--size", action="append", default=[], type=_size, metavar="NAME=NUMBER", help=f"warp: {', '.join(SIZES)}"
+    )
     return parser.parse_args()
+
+
+def _size(text: str) -> tuple[str, object]:
+    name, _, value = text.partition("=")
+    if name not in SIZES:
+        raise argparse.ArgumentTypeError(f"expected one of {', '.join(SIZES)}, got {name!r}")
+    return name, value if name == "device" else int(value)
 
 
 def _at_least_one(text: str) -> int:
@@ -138,12 +157,23 @@ def _grid(options: argparse.Namespace) -> Pieces:
     return pieces
 
 
+def _warp(options: argparse.Namespace) -> Pieces:
+    sizes = Sizes(**dict(options.size))
+    return {
+        "whole evolution": lambda: [measure_evolution(sizes)],
+        "bare steps": lambda: [compare_with_bare_steps(sizes)],
+        "memory": lambda: [measure_device_memory(sizes)],
+        "runs side by side": lambda: compare_with_cpu(sizes),
+    }
+
+
 PARTS: dict[str, tuple[Callable[[argparse.Namespace], Pieces], str]] = {
     "evolution": (_evolution, "evolution.csv"),
     "generation": (_generation, "generation.csv"),
     "training": (_training, "training.csv"),
     "ant": (_ant, "ant_speed.csv"),
     "grid": (_grid, "grid_worlds.csv"),
+    "warp": (_warp, "warp.csv"),
 }
 """What can be measured alone, and the table that it fills."""
 

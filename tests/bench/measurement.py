@@ -11,6 +11,7 @@ from typing import NamedTuple
 RATIO = "ratio"
 SECONDS = "s"
 MEGABYTES = "MB"
+STEPS_A_SECOND = "steps/s"
 """Units of the rows; 1 MB is 10^6 bytes."""
 
 
@@ -44,7 +45,7 @@ class Row:
 
     Attributes:
         comparison: what was compared or measured, in words.
-        unit: one of `RATIO`, `SECONDS` and `MEGABYTES`.
+        unit: one of `RATIO`, `SECONDS`, `MEGABYTES` and `STEPS_A_SECOND`.
         values: one per repetition, in that unit.
         bar: what their median should reach; None where nothing is asked of it.
         note: what a reader needs to judge the figures by.

@@ -234,6 +234,18 @@ class RobotTask(Task):
         sense, drive = (dynamics.sense, dynamics.drive) if self.frame == "part" else (None, None)
         return Simulation(world, *functions, sense=sense, drive=drive, owner=(model, data))
 
+    def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
+        """Open `count` worlds on a device, with `room` times the usual room for contacts.
+
+        Raises:
+            ConfigError: MuJoCo Warp cannot simulate the model.
+        """
+        from exneat_cli.tasks.robots.batch.worlds import RobotWorlds
+
+        scale = self.usual_reset_scale() if reset_scale is None else reset_scale
+        simulation = self.open_disturbed(training=training, reset_scale=scale)
+        return RobotWorlds(load(self.model), simulation, count, device, room)
+
     def _sensors_and_actuators(self, model: mujoco.MjModel) -> dict[str, Any]:
         low, high = np.where(model.actuator_ctrllimited[:, None], model.actuator_ctrlrange, (-1.0, 1.0)).T
         _, readings, sensing = self._anatomy

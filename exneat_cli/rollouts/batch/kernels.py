@@ -1,0 +1,158 @@
+"""Kernels that give jobs to worlds, disturb readings and keep count of episodes.
+
+A job is one brain in one episode. Which world does it has no effect on what comes out: noise depends on the episode,
+the step and the reading alone.
+"""
+
+import warp as wp
+
+from exneat_cli.tasks import ENDED, FAILED, RUNNING
+
+wp.set_module_options({"enable_backward": False})
+
+IDLE = -1
+"""Status of a world that has no job."""
+_RUNNING, _ENDED, _FAILED, _IDLE = wp.constant(RUNNING), wp.constant(ENDED), wp.constant(FAILED), wp.constant(IDLE)
+# Constants of Philox.
+_MULTIPLY_ONE, _MULTIPLY_TWO = wp.constant(wp.uint64(0xD2511F53)), wp.constant(wp.uint64(0xCD9E8D57))
+_ADD_ONE, _ADD_TWO = wp.constant(wp.uint32(0x9E3779B9)), wp.constant(wp.uint32(0xBB67AE85))
+_LOW_WORD = wp.constant(wp.uint64(0xFFFFFFFF))
+
+
+@wp.struct
+class Jobs:
+    """Queued jobs: those from head to tail wait; and where each stands in the outcomes of its slot."""
+
+    head: wp.array(dtype=int)
+    tail: wp.array(dtype=int)
+    slot: wp.array(dtype=int)
+    brain: wp.array(dtype=int)
+    episode: wp.array(dtype=int)
+    place: wp.array(dtype=int)
+
+
+@wp.struct
+class Doing:
+    """What each world does: its slot, its brain in there (-1: none), its episode, its place, and its count so far."""
+
+    slot: wp.array(dtype=int)
+    brain: wp.array(dtype=int)
+    episode: wp.array(dtype=int)
+    place: wp.array(dtype=int)
+    steps: wp.array(dtype=int)
+    totals: wp.array2d(dtype=wp.float64)
+
+
+@wp.struct
+class Outcome:
+    """Of each slot and place, (S, places): status, steps and (S, places, 4) totals; (S,) how many episodes ended."""
+
+    status: wp.array2d(dtype=int)
+    steps: wp.array2d(dtype=int)
+    totals: wp.array3d(dtype=wp.float64)
+    ended: wp.array(dtype=int)
+
+
+@wp.kernel
+def take_jobs(
+    jobs: Jobs,
+    doing: Doing,
+    status: wp.array(dtype=int),
+    begins: wp.array(dtype=int),
+    episodes_per_slot: int,
+    memory: wp.array2d(dtype=float),
+):
+    """Give the next job to each world that runs none; a world for which there is none goes to rest in row 0."""
+    w = wp.tid()
+    begins[w] = -1
+    if status[w] == _RUNNING:
+        return
+    k = int(-1)
+    if jobs.head[0] < jobs.tail[0]:
+        k = wp.atomic_add(jobs.head, 0, 1)
+        if k >= jobs.tail[0]:
+            wp.atomic_sub(jobs.head, 0, 1)
+            k = -1
+    if k < 0:
+        if status[w] != _IDLE:
+            status[w] = _IDLE
+            doing.brain[w] = -1
+            begins[w] = 0
+        return
+    k = k % jobs.slot.shape[0]
+    doing.slot[w] = jobs.slot[k]
+    doing.brain[w] = jobs.brain[k]
+    doing.episode[w] = jobs.slot[k] * episodes_per_slot + jobs.episode[k]
+    doing.place[w] = jobs.place[k]
+    doing.steps[w] = 0
+    for i in range(doing.totals.shape[1]):
+        doing.totals[w, i] = wp.float64(0.0)
+    for i in range(memory.shape[1]):
+        memory[w, i] = 0.0
+    begins[w] = 1 + doing.episode[w]
+    status[w] = _RUNNING
+
+
+@wp.func
+def _philox(key0: wp.uint32, key1: wp.uint32, step: wp.uint32, block: wp.uint32):
+    """Four random words for a key and a counter: Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as
+    1, 2, 3", 2011).
+    """
+    a, b, c, d = step, block, wp.uint32(0), wp.uint32(0)
+    k, m = key0, key1
+    for _ in range(10):
+        one = wp.uint64(a) * _MULTIPLY_ONE
+        two = wp.uint64(c) * _MULTIPLY_TWO
+        a = wp.uint32(two >> wp.uint64(32)) ^ b ^ k
+        b = wp.uint32(two & _LOW_WORD)
+        c = wp.uint32(one >> wp.uint64(32)) ^ d ^ m
+        d = wp.uint32(one & _LOW_WORD)
+        k = k + _ADD_ONE
+        m = m + _ADD_TWO
+    return a, b, c, d
+
+
+@wp.func
+def _normals(first: wp.uint32, second: wp.uint32):
+    """Two independent normal numbers of two random words (Box and Muller, 1958)."""
+    radius = wp.sqrt(-2.0 * wp.log((float(first >> wp.uint32(8)) + 1.0) * wp.static(2.0**-24)))
+    angle = wp.static(2.0 * 3.141592653589793 * 2.0**-24) * float(second >> wp.uint32(8))
+    return radius * wp.cos(angle), radius * wp.sin(angle)
+
+
+@wp.kernel
+def disturb(keys: wp.array2d(dtype=wp.uint32), doing: Doing, sd: float, count: int, readings: wp.array2d(dtype=float)):
+    """Add normal noise to four readings of one world."""
+    w, block = wp.tid()
+    if doing.brain[w] < 0:
+        return
+    episode = doing.episode[w]
+    a, b, c, d = _philox(keys[episode, 0], keys[episode, 1], wp.uint32(doing.steps[w]), wp.uint32(block))
+    one, two = _normals(a, b)
+    three, four = _normals(c, d)
+    first = 4 * block
+    readings[w, first] += sd * one
+    if first + 1 < count:
+        readings[w, first + 1] += sd * two
+    if first + 2 < count:
+        readings[w, first + 2] += sd * three
+    if first + 3 < count:
+        readings[w, first + 3] += sd * four
+
+
+@wp.kernel
+def keep_count(status: wp.array(dtype=int), terms: wp.array2d(dtype=float), doing: Doing, outcome: Outcome):
+    """Add what the step gave, and write down the episodes that ended with it."""
+    w = wp.tid()
+    if doing.brain[w] < 0:
+        return
+    doing.steps[w] += 1
+    for i in range(terms.shape[1]):
+        doing.totals[w, i] += wp.float64(terms[w, i])
+    if status[w] != _RUNNING:
+        slot, place = doing.slot[w], doing.place[w]
+        outcome.status[slot, place] = status[w]
+        outcome.steps[slot, place] = doing.steps[w]
+        for i in range(terms.shape[1]):
+            outcome.totals[slot, place, i] = doing.totals[w, i]
+        wp.atomic_add(outcome.ended, slot, 1)
