@@ -14,7 +14,8 @@ import numpy as np
 from numpy.random import SeedSequence
 
 from exneat_cli.algorithms.algorithm import Problem, State
-from exneat_cli.algorithms.evolution_strategy import MirroredStrategy, Optimiser, Vectors, finite
+from exneat_cli.algorithms.evolution_strategy import MirroredStrategy, Optimiser, finite
+from exneat_cli.algorithms.weight_vector import Vectors
 from exneat_cli.errors import ConfigError, check_real, check_whole
 from exneat_cli.seeding import generator, generator_in
 

@@ -14,7 +14,8 @@ from numpy.random import SeedSequence
 
 from exneat_cli.algorithms.algorithm import State
 from exneat_cli.algorithms.ars import LEAST
-from exneat_cli.algorithms.evolution_strategy import MirroredStrategy, Optimiser, Vectors, finite
+from exneat_cli.algorithms.evolution_strategy import MirroredStrategy, Optimiser, finite
+from exneat_cli.algorithms.weight_vector import Vectors
 from exneat_cli.errors import check_real
 from exneat_cli.seeding import generator, generator_in
 

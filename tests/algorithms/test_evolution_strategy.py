@@ -15,8 +15,9 @@ from hypothesis import strategies as some
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms import ALGORITHMS, ARS, CMAES, EvolutionSettings, OpenAIES, Results
-from exneat_cli.algorithms.evolution_strategy import LEAST_SD, RACERS, EvolutionStrategy, Layout
+from exneat_cli.algorithms.evolution_strategy import RACERS, EvolutionStrategy
 from exneat_cli.algorithms.openai_es import centred_ranks
+from exneat_cli.algorithms.weight_vector import LEAST_SD, Layout
 from exneat_cli.brains import assemble
 from exneat_cli.brains.brain import activate, memory_size
 from exneat_cli.runs import RunSettings
