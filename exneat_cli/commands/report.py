@@ -41,9 +41,9 @@ def run(line: CommandLine) -> int:
     budgets = {name: asked["budget"] or _largest_budget(experiments[name], asked["output"]) for name in names}
     commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
     lacking = ExneatError(f"output={asked['output']}: no finished run of {', '.join(names)}\n  {commands[names[0]]}")
-    # Planning composes every variant and condition, which takes seconds: first see whether there is anything at all.
     if not any(_has_finished(experiments[name], budgets[name], asked["output"]) for name in names):
-        raise lacking
+        plan_jobs(experiments[names[0]], budgets[names[0]], line, _OWN)  # refuses settings that make no sense
+        raise lacking  # planning all of them takes ten seconds
     studies = {name: _study(experiments[name], budgets[name], commands[name], line) for name in names}
     if not any(study.finished for study in studies.values()):
         raise lacking

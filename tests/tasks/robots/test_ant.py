@@ -120,10 +120,10 @@ def test_parts_are_the_legs_by_position_with_the_joints_of_that_leg() -> None:
     task = AntTask()
     driven = {part.name: [task.actuator_names[a] for a in part.actuators] for part in task.parts}
     assert list(driven.items()) == [
-        ("front_left", ["hip_1", "ankle_1"]),
-        ("front_right", ["hip_4", "ankle_4"]),
-        ("back_left", ["hip_2", "ankle_2"]),
-        ("back_right", ["hip_3", "ankle_3"]),
+        ("front_left", ["hip_1 (150 N m)", "ankle_1 (150 N m)"]),
+        ("front_right", ["hip_4 (150 N m)", "ankle_4 (150 N m)"]),
+        ("back_left", ["hip_2 (150 N m)", "ankle_2 (150 N m)"]),
+        ("back_right", ["hip_3 (150 N m)", "ankle_3 (150 N m)"]),
     ]
     assert [[np.sign(x), np.sign(y)] for x, y in (part.position for part in task.parts)] == [
         [1, 1],
@@ -140,7 +140,7 @@ def test_a_leg_senses_its_own_joints_and_bodies_and_no_others(gymnasium_ant: Any
     model = gymnasium_ant.unwrapped.model
     task = AntTask()
     for part in task.parts:
-        joints = [model.joint(task.actuator_names[a]) for a in part.actuators]
+        joints = [model.joint(task.actuator_names[a].split()[0]) for a in part.actuators]
         angles = {int(joint.qposadr[0]) - 2 for joint in joints}
         velocities = {model.nq - 2 + int(joint.dofadr[0]) for joint in joints}
         bodies = {1 + (index - 27) // 6 for index in part.sensors if index >= 27}
