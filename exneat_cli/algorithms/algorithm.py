@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -47,6 +48,20 @@ class Results(NamedTuple):
     fitness: NDArray[np.float64]
     failed: NDArray[np.bool_]
     sensed: tuple[Moments, ...] = ()
+
+    def means(self, teams: int) -> list[float]:
+        """Mean fitness of each team.
+
+        Raises:
+            ValueError: there are not so many teams, or a mean is not finite.
+        """
+        if len(self.fitness) != teams:
+            raise ValueError(f"tell: expected {teams} fitness values, got {len(self.fitness)}")
+        means: list[float] = self.fitness.mean(axis=1).tolist()
+        for index, value in enumerate(means):
+            if not math.isfinite(value):
+                raise ValueError(f"tell: expected finite fitness values, got {value!r} for team {index}")
+        return means
 
 
 @dataclass(frozen=True)

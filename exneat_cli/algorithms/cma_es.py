@@ -15,8 +15,7 @@ import numpy as np
 from numpy.random import SeedSequence
 
 from exneat_cli.algorithms.algorithm import Problem, State
-from exneat_cli.algorithms.ars import LEAST
-from exneat_cli.algorithms.evolution_strategy import EvolutionStrategy, Optimiser, finite
+from exneat_cli.algorithms.evolution_strategy import LEAST, EvolutionStrategy, Optimiser, finite
 from exneat_cli.algorithms.weight_vector import Layout, Vectors
 from exneat_cli.errors import ConfigError, check_choice, check_real
 

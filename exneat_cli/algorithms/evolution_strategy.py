@@ -17,6 +17,7 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.candidates import RACERS
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.weight_vector import Layout, Vectors, has_biases
 from exneat_cli.errors import ConfigError, check_choice, check_flag
@@ -27,8 +28,8 @@ from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, merged, plan_body
 INITIAL_SD = 0.03
 """Of weights, where there are hidden nodes; all 0, these would never learn. Without them weights begin at 0, as in
 Mania et al. (2018)."""
-RACERS = 32
-"""Most candidates."""
+LEAST = 1e-6
+"""Of step sizes and of the noise: less changes nothing that a network would show."""
 _STARTS = ("full_direct", "full_nodirect")
 
 
@@ -60,6 +61,27 @@ class Optimiser(ABC):
         Raises:
             ArithmeticError, LookupError, TypeError, ValueError: it is none, or does not fit.
         """
+
+
+class MirroredOptimiser(Optimiser):
+    """One whose samples come in pairs: a step along each of some random directions, and one against it.
+
+    Args:
+        start: (n,) where it begins.
+        population: even number of samples.
+        seed: of the directions.
+        noise: length of a step for a direction of standard normal numbers.
+    """
+
+    def __init__(self, start: Vectors, population: int, seed: SeedSequence, noise: float) -> None:
+        self.centre = start
+        self._count, self._noise, self._rng = population // 2, noise, generator(seed)
+
+    def ask(self) -> Vectors:
+        """One step along each direction, then one against each."""
+        self._directions = self._rng.standard_normal((self._count, len(self.centre)))
+        steps = self._noise * self._directions
+        return np.concatenate([self.centre + steps, self.centre - steps])
 
 
 @dataclass(frozen=True)
@@ -188,12 +210,7 @@ class StrategySearch(Search):
         """Update; a team that failed counts as the worst."""
         if not self._waiting:
             raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
-        if len(results.fitness) != self._problem.population:
-            expected, came = self._problem.population, len(results.fitness)
-            raise ValueError(f"tell: expected {expected} fitness values, got {came}")
-        fitness = results.fitness.mean(axis=1)
-        if not np.isfinite(fitness).all():
-            raise ValueError(f"tell: expected finite fitness values, got {fitness.tolist()}")
+        fitness = np.array(results.means(self._problem.population))
         self._waiting = False
         self._optimiser.tell(np.where(results.failed, fitness.min(), fitness))
         if self._normalises:

@@ -119,12 +119,7 @@ class Coevolution(Search):
         """Take what the teams got; the generation is over once the best had their second look."""
         if not self._asked:
             raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
-        if len(results.fitness) != len(self._asked):
-            raise ValueError(f"tell: expected {len(self._asked)} fitness values, got {len(results.fitness)}")
-        means, episodes = results.fitness.mean(axis=1).tolist(), results.fitness.shape[1]
-        for index, value in enumerate(means):
-            if not math.isfinite(value):
-                raise ValueError(f"tell: expected finite fitness values, got {value!r} for team {index}")
+        means, episodes = results.means(len(self._asked)), results.fitness.shape[1]
         for k, mean, failed in zip(self._asked, means, results.failed.tolist(), strict=True):
             ids = self._teams[k].ids
             self._records[ids] = self._records[ids].after(mean, episodes, failed=failed)

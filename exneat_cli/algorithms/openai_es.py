@@ -13,33 +13,25 @@ import numpy as np
 from numpy.random import SeedSequence
 
 from exneat_cli.algorithms.algorithm import State
-from exneat_cli.algorithms.ars import LEAST
-from exneat_cli.algorithms.evolution_strategy import MirroredStrategy, Optimiser, finite
+from exneat_cli.algorithms.evolution_strategy import LEAST, MirroredOptimiser, MirroredStrategy, Optimiser, finite
 from exneat_cli.algorithms.weight_vector import Vectors
 from exneat_cli.errors import check_real
-from exneat_cli.seeding import generator, generator_in
+from exneat_cli.seeding import generator_in
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
 """Adam's constants (Kingma and Ba, 2015)."""
 
 
-class RankedGradient(Optimiser):
+class RankedGradient(MirroredOptimiser):
     """The update of `OpenAIES`; arguments as there."""
 
     def __init__(
         self, start: Vectors, population: int, seed: SeedSequence, step_size: float, noise: float, weight_decay: float
     ) -> None:
-        self.centre = start
-        self._count, self._step_size, self._noise, self._weight_decay = population // 2, step_size, noise, weight_decay
-        self._rng = generator(seed)
+        super().__init__(start, population, seed, noise)
+        self._step_size, self._weight_decay = step_size, weight_decay
         self._updates = 0
         self._first, self._second = np.zeros((2, len(start)))  # Adam's moments of the gradient
-
-    def ask(self) -> Vectors:
-        """One step along each direction, then one against each."""
-        self._directions = self._rng.standard_normal((self._count, len(self.centre)))
-        steps = self._noise * self._directions
-        return np.concatenate([self.centre + steps, self.centre - steps])
 
     def tell(self, fitness: Vectors) -> None:
         """Climb the gradient of the ranks, less the decay of the weights."""

@@ -14,7 +14,7 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -61,9 +61,7 @@ class CommandLine:
                 plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
             except OmegaConfBaseException as error:
                 raise ExneatError(in_words(error, self.directories)) from error
-        for key in keys:
-            if key not in plain:
-                raise ExneatError(f"{key}: is missing")
+        _check_there(plain, keys)
         return {str(key): value for key, value in plain.items()}
 
     def compose_only(self, needed: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Any]:
@@ -74,9 +72,7 @@ class CommandLine:
         """
         plain = self.compose()
         check_keys("", plain, (*needed, *optional))
-        for key in needed:
-            if key not in plain:
-                raise ExneatError(f"{key}: is missing")
+        _check_there(plain, needed)
         return plain
 
     @contextlib.contextmanager
@@ -129,6 +125,12 @@ class CommandLine:
             paths = [path for directory in self.directories if (path := directory / f"{name}.yaml").exists()]
             texts += [title + path.read_text("utf-8").removeprefix("# @package _global_\n") for path in paths[:1]]
         return "\n".join(texts).rstrip()
+
+
+def _check_there(plain: Mapping[str, Any], keys: Sequence[str]) -> None:
+    for key in keys:
+        if key not in plain:
+            raise ExneatError(f"{key}: is missing")
 
 
 def shipped_directory(name: str) -> Path:
