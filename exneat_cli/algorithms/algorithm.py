@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -93,6 +93,18 @@ State = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 """A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
 
 
+def finite(columns: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """A column of finite numbers of this shape, from a file of anyone's.
+
+    Raises:
+        KeyError, ValueError: there is none.
+    """
+    column = columns[name]
+    if column.dtype != np.float64 or column.shape != shape or not np.isfinite(column).all():
+        raise ValueError(f"{name}: expected finite numbers, {shape}, got {column.dtype} {column.shape}")
+    return column
+
+
 class Search(ABC):
     """An algorithm at work. A generation is one or more turns of `ask` and `tell`."""
 
@@ -138,8 +150,7 @@ class Algorithm(ABC):
     name: str
     """Its name in `conf/algorithm` and in run directories."""
 
-    @property
-    def wants_moments(self) -> bool:
+    def wants_moments(self, evolution: EvolutionSettings) -> bool:
         """Whether it is told the statistics of what its networks sense, `Results.sensed`."""
         return False
 

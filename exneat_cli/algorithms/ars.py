@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import SeedSequence
 
-from exneat_cli.algorithms.algorithm import Problem, State
-from exneat_cli.algorithms.evolution_strategy import LEAST, MirroredOptimiser, MirroredStrategy, Optimiser, finite
+from exneat_cli.algorithms.algorithm import Problem, State, finite
+from exneat_cli.algorithms.evolution_strategy import LEAST, MirroredOptimiser, MirroredStrategy, Optimiser
 from exneat_cli.algorithms.weight_vector import Vectors
 from exneat_cli.errors import ConfigError, check_real, check_whole
 from exneat_cli.seeding import generator_in

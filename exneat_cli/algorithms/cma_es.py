@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.random import SeedSequence
 
-from exneat_cli.algorithms.algorithm import Problem, State
-from exneat_cli.algorithms.evolution_strategy import LEAST, EvolutionStrategy, Optimiser, finite
+from exneat_cli.algorithms.algorithm import Problem, State, finite
+from exneat_cli.algorithms.evolution_strategy import LEAST, EvolutionStrategy, Optimiser
 from exneat_cli.algorithms.weight_vector import Layout, Vectors
 from exneat_cli.errors import ConfigError, check_choice, check_real
 

@@ -8,22 +8,20 @@ turns its samples into teams, whose inputs `Layout` normalises.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.random import SeedSequence
-from numpy.typing import NDArray
 
-from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team, finite
 from exneat_cli.algorithms.candidates import RACERS
 from exneat_cli.algorithms.neat.settings import EvolutionSettings
 from exneat_cli.algorithms.weight_vector import Layout, Vectors, has_biases
 from exneat_cli.errors import ConfigError, check_choice, check_flag
 from exneat_cli.seeding import generator, stream
 from exneat_cli.tasks import Task
-from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, merged, plan_body, refuse_modules
+from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_body, refuse_modules, with_sensed
 
 INITIAL_SD = 0.03
 """Of weights, where there are hidden nodes; all 0, these would never learn. Without them weights begin at 0, as in
@@ -107,8 +105,7 @@ class EvolutionStrategy(Algorithm):
         if self.normalise is not None:
             check_flag("algorithm.normalise", self.normalise)
 
-    @property
-    def wants_moments(self) -> bool:
+    def wants_moments(self, evolution: EvolutionSettings) -> bool:
         """Whether inputs may have to be normalised."""
         return self.normalise is not False
 
@@ -214,8 +211,7 @@ class StrategySearch(Search):
         self._waiting = False
         self._optimiser.tell(np.where(results.failed, fitness.min(), fitness))
         if self._normalises:
-            pairs = zip(self._moments, results.sensed, strict=True)
-            self._moments = [merged((before, new), before.counts.size) for before, new in pairs]
+            self._moments = with_sensed(self._moments, results.sensed)
         if not results.failed.all():
             (centre,) = self._layout.folded(self._optimiser.centre[np.newaxis], self._moments)
             self._remember(float(fitness[~results.failed].mean()), centre)
@@ -273,15 +269,3 @@ class StrategySearch(Search):
             if not np.isfinite(fitness) or not 0 <= generation < self._generation:
                 raise ValueError(f"expected a finite fitness in a generation before now, got {fitness}, {generation}")
             self._centres.append((float(fitness), int(generation), centre))
-
-
-def finite(columns: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> Vectors:
-    """A column of finite numbers of this shape, from a file of anyone's.
-
-    Raises:
-        KeyError, ValueError: there is none.
-    """
-    column = columns[name]
-    if column.dtype != np.float64 or column.shape != shape or not np.isfinite(column).all():
-        raise ValueError(f"{name}: expected finite numbers, {shape}, got {column.dtype} {column.shape}")
-    return column

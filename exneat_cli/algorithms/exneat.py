@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
+from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team, finite
 from exneat_cli.algorithms.candidates import with_candidate, with_racers
 from exneat_cli.algorithms.neat.conversion import Columns, pack_teams, unpack_teams
 from exneat_cli.algorithms.neat.neat_python import neat_config
@@ -28,7 +28,7 @@ from exneat_cli.algorithms.pairing import by_rank, with_siblings
 from exneat_cli.errors import check_choice
 from exneat_cli.seeding import generator, generator_in, stream
 from exneat_cli.tasks import Task
-from exneat_cli.wiring import Geometry, Plan, Wiring, plan_body, refuse_modules
+from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_body, refuse_modules, with_sensed
 
 JUDGINGS = ("last", "mean")
 """Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
@@ -73,7 +73,9 @@ class Coevolution(Search):
         self._fitness: list[float] = []  # of the teams, as they compete; empty until the generation is over
         self._generation = self._extinctions = 0
         self._hall_of_fame: list[Candidate] = []
-        shapes, teams = problem.plan.subpopulation_shapes, problem.population - self._looks
+        shapes, safe = problem.plan.subpopulation_shapes, problem.evolution.safe_mutation
+        self._sensed = [Moments(*np.zeros((3, pins))) for pins, _, _ in shapes] if safe else []
+        teams = problem.population - self._looks
         survivors = math.ceil(SURVIVORS * teams) if self._by_mean else 0
         configs = [neat_config(problem.evolution, teams, shape, survivors) for shape in shapes]
         if state is None:
@@ -105,7 +107,7 @@ class Coevolution(Search):
             shared = separate_ties(self._fitness) if len(self._subpopulations) > 1 else self._fitness
             for index, subpopulation in enumerate(self._subpopulations):
                 fitness = {team.ids[index]: value for team, value in zip(self._teams, shared, strict=True)}
-                self._extinctions += subpopulation.advance(fitness)
+                self._extinctions += subpopulation.advance(fitness, self._sensed[index] if self._sensed else None)
         orders = [list(subpopulation.genomes) for subpopulation in self._subpopulations]
         if self._problem.pairing != "index":
             orders = by_rank(orders, ranked, self._pairing_rng)
@@ -123,6 +125,8 @@ class Coevolution(Search):
         for k, mean, failed in zip(self._asked, means, results.failed.tolist(), strict=True):
             ids = self._teams[k].ids
             self._records[ids] = self._records[ids].after(mean, episodes, failed=failed)
+        if self._problem.evolution.safe_mutation:
+            self._sensed = with_sensed(self._sensed, results.sensed)
         is_over = self._looks == 0 or len(self._asked) < len(self._teams)
         self._asked = []
         if is_over:
@@ -190,6 +194,7 @@ class Coevolution(Search):
         arrays = pack_teams([entry.team for entry in self._hall_of_fame], "hall_of_fame")
         for _, columns in states:
             arrays |= columns
+        arrays |= {f"sensed.{index}": np.array(moments) for index, moments in enumerate(self._sensed)}
         return plain, arrays
 
     def _restore(self, plain: Mapping[str, Any], arrays: Columns) -> None:
@@ -207,6 +212,9 @@ class Coevolution(Search):
             if not all(math.isfinite(each.mean) and each.episodes > 0 for each in told):
                 raise ValueError("expected finite means over at least one episode of every team")
             self._records = {team.ids: each for team, each in zip(self._teams, told, strict=True)}
+        if self._problem.evolution.safe_mutation:
+            shapes = enumerate(self._problem.plan.subpopulation_shapes)
+            self._sensed = [Moments(*finite(arrays, f"sensed.{index}", (3, pins))) for index, (pins, _, _) in shapes]
         self._generation = int(plain["generation"])
         teams = unpack_teams(arrays, "hall_of_fame", self._problem)
         for team, (fitness, generation) in zip(teams, plain["hall_of_fame"], strict=True):
@@ -223,6 +231,10 @@ class ExNEAT(Algorithm):
 
     def __post_init__(self) -> None:
         check_choice("algorithm.name", self.name, [type(self).name])
+
+    def wants_moments(self, evolution: EvolutionSettings) -> bool:
+        """Whether mutations are to be safe."""
+        return evolution.safe_mutation
 
     def start(self, problem: Problem) -> Search:
         """Begin with random genomes."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import SeedSequence
 
-from exneat_cli.algorithms.algorithm import State
-from exneat_cli.algorithms.evolution_strategy import LEAST, MirroredOptimiser, MirroredStrategy, Optimiser, finite
+from exneat_cli.algorithms.algorithm import State, finite
+from exneat_cli.algorithms.evolution_strategy import LEAST, MirroredOptimiser, MirroredStrategy, Optimiser
 from exneat_cli.algorithms.weight_vector import Vectors
 from exneat_cli.errors import check_real
 from exneat_cli.seeding import generator_in

@@ -73,10 +73,10 @@ def run(line: CommandLine) -> int:
 def _artefacts(asked: Mapping[str, Any], own: Experiment | None) -> dict[str, FigurePlan | TablePlan]:
     """What is to be built: from the catalogue, or, for an experiment that is not in it, one figure for each thing."""
     catalogue = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
-    if own and asked["experiment"] in experiment_names():
-        catalogue = {name: each for name, each in catalogue.items() if own.name in _experiments_of(each)}
-    elif own:
-        catalogue = _figures_for(own)
+    if own:
+        shipped = asked["experiment"] in experiment_names()
+        known = {name: each for name, each in catalogue.items() if shipped and own.name in _experiments_of(each)}
+        catalogue = known or _figures_for(own)
     if asked["only"] is None:
         return catalogue
     check_choice("only", asked["only"], list(catalogue))

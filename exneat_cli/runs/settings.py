@@ -36,6 +36,7 @@ _CAME_LATER = (
     ("wiring", "trunk", "none"),
     ("evolution", "output_activation", None),
     ("evolution", "mutation", "fixed"),
+    ("evolution", "safe_mutation", False),
     ("evolution", "weight_mutate_power_min", 0.0),
     ("evolution", "weight_mutate_power_max", 12.0),
     ("evolution", "crossover_prob", 1.0),
@@ -131,8 +132,10 @@ class RunSettings:
         """Refuse what does not run in batches on a GPU."""
         if not isinstance(self.task, HasBatch):
             raise ConfigError("executor", f"another one with task={self.task.name}", "warp", "only robots run there")
-        if self.algorithm.wants_moments:
+        if self.wants_moments:
             fix = "executor=threads gathers the statistics of what is sensed, which it needs"
+            if self.evolution.safe_mutation:
+                fix = f"{fix}; or evolution.safe_mutation=false"
             raise ConfigError("executor", f"another one with algorithm={self.algorithm.name}", "warp", fix)
 
     def _settle(self) -> None:
@@ -179,6 +182,11 @@ class RunSettings:
         elif self.task.trunk is not None and self.wiring.central is False:
             words.append("nocentral")
         return "-".join(words)
+
+    @property
+    def wants_moments(self) -> bool:
+        """Whether the algorithm is told the statistics of what networks sense."""
+        return self.algorithm.wants_moments(self.evolution)
 
     @property
     def trained_generations(self) -> int:

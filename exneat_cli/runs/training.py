@@ -89,7 +89,7 @@ class Training:
             brains = assemble(settings.plan, genomes, feed_forward=settings.evolution.feed_forward)
             done = sum(each.steps.shape[1] for each in outcomes)
             episodes = training_episodes(settings.seed, len(self.history), count, first=done)
-            outcomes.append(runner.run(brains, episodes, moments=settings.algorithm.wants_moments))
+            outcomes.append(runner.run(brains, episodes, moments=settings.wants_moments))
             teams += asked
             over = self.search.tell(_results(settings, outcomes[-1]))
         self._record(teams, outcomes)

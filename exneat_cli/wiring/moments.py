@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +34,11 @@ def merged(parts: Iterable[Moments], size: int) -> Moments:
         mean = mean + step * share
         count = together
     return Moments(count, mean, squares)
+
+
+def with_sensed(before: Sequence[Moments], new: Sequence[Moments]) -> list[Moments]:
+    """The moments of every subpopulation's pins after some more was sensed."""
+    return [merged(pair, pair[0].counts.size) for pair in zip(before, new, strict=True)]
 
 
 def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:

@@ -221,7 +221,12 @@ def draw(number: Number, rng: Generator) -> float:
 
 @compiled
 def mutate_attributes(
-    genes: Genes, numbers: tuple[Number, Number, Number], disable_rate: float, enable_rate: float, rng: Generator
+    genes: Genes,
+    numbers: tuple[Number, Number, Number],
+    disable_rate: float,
+    enable_rate: float,
+    sensitivity: NDArray[np.float64],
+    rng: Generator,
 ) -> None:
     """Change weights, enabled flags, biases and responses in place: each is shifted, drawn anew or left.
 
@@ -230,26 +235,29 @@ def mutate_attributes(
         numbers: how weights, biases and responses change.
         disable_rate: chance that an enabled connection's flag is drawn anew, either way with equal chance.
         enable_rate: the same of a disabled connection.
+        sensitivity: (pins,) what shifts of the weights that read these are divided by.
         rng: of all draws.
     """
     (nodes, connections), (weight, bias, response) = genes, numbers
     for i in range(connections.size):
-        connections[i].weight = _mutated(connections[i].weight, weight, rng)
+        source = connections[i].source
+        divisor = sensitivity[-1 - source] if source < 0 else 1.0
+        connections[i].weight = _mutated(connections[i].weight, weight, divisor, rng)
         if rng.random() < (disable_rate if connections[i].enabled else enable_rate):
             connections[i].enabled = rng.random() < 0.5
     for i in range(nodes.size):
-        nodes[i].bias = _mutated(nodes[i].bias, bias, rng)
-        nodes[i].response = _mutated(nodes[i].response, response, rng)
+        nodes[i].bias = _mutated(nodes[i].bias, bias, 1.0, rng)
+        nodes[i].response = _mutated(nodes[i].response, response, 1.0, rng)
 
 
 @compiled
-def _mutated(value, number, rng):  # type: ignore[no-untyped-def]
+def _mutated(value, number, divisor, rng):  # type: ignore[no-untyped-def]
     _, _, shift_rate, replace_rate, power, low, high = number
     if shift_rate + replace_rate <= 0.0:
         return value
     chance = rng.random()
     if chance < shift_rate:
-        return max(min(value + power * rng.standard_normal(), high), low)
+        return max(min(value + power / divisor * rng.standard_normal(), high), low)
     if chance < shift_rate + replace_rate:
         return draw(number, rng)
     return value

@@ -112,7 +112,7 @@ class ArrayGenome:
         scale = self._vary_power(config) if self.power is not None else 1.0
         weight, bias = (_scaled(number(config, name), scale) for name in ("weight", "bias"))
         numbers = weight, bias, number(config, "response")
-        mutate_attributes(self.genes, numbers, disable_rate, enable_rate, rng)
+        mutate_attributes(self.genes, numbers, disable_rate, enable_rate, config.sensitivity, rng)
 
     def _vary_power(self, config: DefaultGenomeConfig) -> float:
         """Vary the genome's own mutation power; returns its share of the one that all genomes began with.

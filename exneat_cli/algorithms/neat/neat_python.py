@@ -23,6 +23,7 @@ import neat.attributes
 import neat.genes
 import neat.genome
 import neat.reproduction
+import numpy as np
 from neat.reporting import ReporterSet
 from neat.species import DefaultSpeciesSet
 
@@ -167,8 +168,8 @@ def neat_config(
     """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
 
     `shape` is inputs, initial hidden nodes and outputs; so many genomes at least survive a generation. Its
-    `genome_config` has more attributes: settings of ours, and `generator`, which must be set before array genomes are
-    made, since they draw from it.
+    `genome_config` has more attributes: settings of ours, `generator`, which must be set before array genomes are
+    made, since they draw from it, and `sensitivity`, (inputs,), which shifts of weights are divided by.
     """
     inputs, hidden, outputs = shape
     config = neat.Config.__new__(neat.Config)
@@ -198,7 +199,7 @@ def neat_config(
         weight_min_value=-settings.weight_max_value,
         bias_min_value=-settings.bias_max_value,
     )
-    config.genome_config.generator = None
+    config.genome_config.generator, config.genome_config.sensitivity = None, np.ones(inputs)
     for name in _OURS:
         setattr(config.genome_config, name, getattr(settings, name))
     config.genome_config.output_activation = settings.output_activation or settings.activation_default

@@ -21,6 +21,8 @@ _CHOICES = {
     "mutation": ("fixed", "adaptive"),
     "parent_selection": ("uniform", "rank"),
 }
+LEAST_SENSITIVITY = 0.05
+"""In a pin's unit. One that hardly ever leaves 0 would be blown up when it does."""
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
 _SHARES = ("_rate", "_prob", "survival_threshold")
 """Endings of the names of what is a probability; other real numbers are only not negative."""
@@ -44,6 +46,10 @@ class EvolutionSettings:
         positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
         mutation: ``fixed`` power, or ``adaptive``: every genome carries a weight_mutate_power of its own, inherits and
             varies it between weight_mutate_power_min and weight_mutate_power_max; bias_mutate_power goes along.
+        safe_mutation: shifts of a weight that reads a sensor are divided by the root mean square of what was sensed
+            there in training so far, at least `LEAST_SENSITIVITY`: so much more the outputs change with that weight.
+            SM-G of Lehman et al., "Safe mutations for deep and recurrent neural networks through output gradients",
+            GECCO 2018, whose gradient of a linear output with respect to a weight is its input.
         weight_*, bias_*: initial values are N(0, init_stdev); a mutation adds N(0, mutate_power) to the share
             mutate_rate and draws the share replace_rate anew; values stay in [-max_value, max_value].
         enabled_mutate_rate: share of connections whose enabled flag a mutation draws anew.
@@ -71,6 +77,7 @@ class EvolutionSettings:
     module_hidden: int = 4
     positive_start: bool = False
     mutation: str = "fixed"
+    safe_mutation: bool = False
     weight_init_stdev: float = 0.12
     weight_mutate_power: float = 0.08
     weight_mutate_power_min: float = 0.0
@@ -119,7 +126,7 @@ class EvolutionSettings:
 
     def _check_together(self) -> None:
         """Refuse what only array genomes can do, and bounds that do not hold the first mutation power."""
-        ours = {"mutation": "fixed", "crossover_prob": 1.0, "parent_selection": "uniform"}
+        ours = {"mutation": "fixed", "safe_mutation": False, "crossover_prob": 1.0, "parent_selection": "uniform"}
         for name, stock in ours.items():
             came = getattr(self, name)
             if self.genome == "stock" and came != stock:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import neat
+import numpy as np
 from neat.reporting import ReporterSet
 from neat.species import DefaultSpeciesSet, Species
 from numpy.random import PCG64, Generator, SeedSequence
@@ -23,7 +24,9 @@ from exneat_cli.algorithms.neat.neat_python import (
     drawing_from,
     peek,
 )
+from exneat_cli.algorithms.neat.settings import LEAST_SENSITIVITY
 from exneat_cli.seeding import generator_in
+from exneat_cli.wiring import Moments
 
 
 class Subpopulation:
@@ -78,8 +81,15 @@ class Subpopulation:
         genome: ArrayGenome = self.genomes[key] if self._in_arrays else from_stock(self.genomes[key])
         return genome
 
-    def advance(self, fitness: Mapping[int, float]) -> bool:
-        """Replace the generation, by the fitness of each genome's id; returns whether all species had died out."""
+    def advance(self, fitness: Mapping[int, float], sensed: Moments | None = None) -> bool:
+        """Replace the generation, by the fitness of each genome's id; returns whether all species had died out.
+
+        Mutations are safe for what was `sensed` at the pins, see `EvolutionSettings`; None takes all alike.
+        """
+        if sensed is not None:
+            root_mean_square = np.sqrt(sensed.means**2 + sensed.squares / np.maximum(sensed.counts, 1.0))
+            at_least = np.maximum(root_mean_square, LEAST_SENSITIVITY)
+            self.config.genome_config.sensitivity = np.where(sensed.counts > 0.0, at_least, 1.0)
         for key, genome in self.genomes.items():
             genome.fitness = fitness[key]
         with drawing_from(self._chance):
