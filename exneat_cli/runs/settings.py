@@ -39,6 +39,7 @@ _CAME_LATER = (
     ("evolution", "safe_mutation", False),
     ("evolution", "weight_mutate_power_min", 0.0),
     ("evolution", "weight_mutate_power_max", 12.0),
+    ("evolution", "crossover", "choose"),
     ("evolution", "crossover_prob", 1.0),
     ("evolution", "parent_selection", "uniform"),
 )

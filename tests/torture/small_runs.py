@@ -20,19 +20,21 @@ _SIZES = {
 }
 _LINKED = {"ant": ["recipe=thesis", "geometry=all", "linkage=full"]}
 _LINKED_GRID = ["geometry=all", "linkage=output"]
+_ON_ANT = ("exneat", "ars", "openai_es", "cma_es")
 _TINY = ["budget=smoke", "executor=serial", "validation_episodes=2", "test_episodes=2"]
 _UNCOMPARED = ("manifest.json", "config.yaml")
 """They tell when, where and how a run went."""
 
 
 def variants() -> list[tuple[str, list[str]]]:
-    """Name and settings of NEAT and of linked ExNEAT on every task."""
+    """Name and settings of NEAT and of linked ExNEAT on every task; on Ant also what shares by likeness."""
     found = []
     for task in TASKS:
         common = [f"task={task}", *_TINY, *_SIZES[task]]
         found.append((f"{task}, NEAT", [*common, "algorithm=neat"]))
         found.append((f"{task}, ExNEAT linked", [*common, *_LINKED.get(task, _LINKED_GRID)]))
-    return found
+    alike = ["task=ant", *_TINY, *_SIZES["ant"], "geometry=auto"]
+    return found + [(f"ant, {name} alike", [*alike, f"algorithm={name}"]) for name in _ON_ANT]
 
 
 def results(root: Path) -> dict[str, bytes]:

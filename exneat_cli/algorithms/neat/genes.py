@@ -117,17 +117,17 @@ def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, sou
 
 
 @compiled
-def cross(fitter: Genes, other: Genes, rng: Generator) -> Genes:
+def cross(fitter: Genes, other: Genes, average: bool, rng: Generator) -> Genes:
     """The genes of a child.
 
-    Matching genes mix attribute by attribute. All others come from the fitter parent, so that a child's graph is that
+    Matching genes mix attribute by attribute; their weights and biases may be averaged instead. All others come from the fitter parent, so that a child's graph is that
     parent's and cannot have a cycle which that has not.
     """
-    return _cross_nodes(fitter[0], other[0], rng), _cross_connections(fitter[1], other[1], rng)
+    return _cross_nodes(fitter[0], other[0], average, rng), _cross_connections(fitter[1], other[1], average, rng)
 
 
 @compiled
-def _cross_nodes(fitter, other, rng):  # type: ignore[no-untyped-def]
+def _cross_nodes(fitter, other, average, rng):  # type: ignore[no-untyped-def]
     child = fitter.copy()
     j = 0
     for i in range(child.size):
@@ -135,7 +135,9 @@ def _cross_nodes(fitter, other, rng):  # type: ignore[no-untyped-def]
         while j < other.size and other[j].key < child[i].key:
             j += 1
         if j < other.size and other[j].key == child[i].key:
-            if rng.random() < 0.5:
+            if average:
+                child[i].bias = 0.5 * (child[i].bias + other[j].bias)
+            elif rng.random() < 0.5:
                 child[i].bias = other[j].bias
             if rng.random() < 0.5:
                 child[i].response = other[j].response
@@ -145,7 +147,7 @@ def _cross_nodes(fitter, other, rng):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cross_connections(fitter, other, rng):  # type: ignore[no-untyped-def]
+def _cross_connections(fitter, other, average, rng):  # type: ignore[no-untyped-def]
     child = fitter.copy()
     j = 0
     for i in range(child.size):
@@ -155,7 +157,9 @@ def _cross_connections(fitter, other, rng):  # type: ignore[no-untyped-def]
         # An innovation number belongs to one pair of nodes, so genes that match by it meet here.
         if j < other.size and other[j].innovation == gene.innovation:
             either_disabled = not (gene.enabled and other[j].enabled)
-            if rng.random() < 0.5:
+            if average:
+                gene.weight = 0.5 * (gene.weight + other[j].weight)
+            elif rng.random() < 0.5:
                 gene.weight = other[j].weight
             if rng.random() < 0.5:
                 gene.enabled = other[j].enabled

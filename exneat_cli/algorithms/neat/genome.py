@@ -93,7 +93,7 @@ class ArrayGenome:
         if genome1.power is not None and genome2.power is not None:
             self.power = math.sqrt(genome1.power * genome2.power)
         fitter, other = (genome1, genome2) if genome1.fitness > genome2.fitness else (genome2, genome1)
-        self.nodes, self.connections = cross(fitter.genes, other.genes, config.generator)
+        self.nodes, self.connections = cross(fitter.genes, other.genes, config.crossover == "average", config.generator)
 
     def mutate(self, config: DefaultGenomeConfig) -> None:
         """Change structure, then attributes."""

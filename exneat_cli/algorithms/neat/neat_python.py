@@ -55,7 +55,7 @@ neat-python takes for true."""
 
 _OURS = (
     *("positive_start", "mutation", "weight_mutate_power_min", "weight_mutate_power_max"),
-    *("crossover_prob", "parent_selection"),
+    *("crossover", "crossover_prob", "parent_selection"),
 )
 """Settings of genomes that neat-python does not have."""
 

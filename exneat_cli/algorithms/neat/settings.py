@@ -19,6 +19,7 @@ _CHOICES = {
     "output_activation": ACTIVATIONS,
     "initial_connection": INITIAL_CONNECTIONS,
     "mutation": ("fixed", "adaptive"),
+    "crossover": ("choose", "average"),
     "parent_selection": ("uniform", "rank"),
 }
 LEAST_SENSITIVITY = 0.05
@@ -54,6 +55,9 @@ class EvolutionSettings:
             mutate_rate and draws the share replace_rate anew; values stay in [-max_value, max_value].
         enabled_mutate_rate: share of connections whose enabled flag a mutation draws anew.
         conn_add_prob, conn_delete_prob, node_add_prob, node_delete_prob: chance of each structural mutation.
+        crossover: whether a child's matching genes ``choose`` each weight and bias from one of the parents, as in
+            neat-python, or take the ``average``: intermediate recombination, by which mutations that do harm cancel
+            out in part (Beyer and Schwefel, "Evolution strategies", Natural Computing 1, 2002).
         crossover_prob: share of children with two parents; neat-python's way is 1.
         parent_selection: ``uniform`` among those that may have offspring, as in neat-python, or by ``rank``.
         compatibility_disjoint_coefficient, compatibility_weight_coefficient: of the genetic distance.
@@ -95,6 +99,7 @@ class EvolutionSettings:
     conn_delete_prob: float = 0.1
     node_add_prob: float = 0.1
     node_delete_prob: float = 0.1
+    crossover: str = "choose"
     crossover_prob: float = 1.0
     parent_selection: str = "uniform"
     compatibility_disjoint_coefficient: float = 1.0
@@ -126,7 +131,13 @@ class EvolutionSettings:
 
     def _check_together(self) -> None:
         """Refuse what only array genomes can do, and bounds that do not hold the first mutation power."""
-        ours = {"mutation": "fixed", "safe_mutation": False, "crossover_prob": 1.0, "parent_selection": "uniform"}
+        ours = {
+            "mutation": "fixed",
+            "safe_mutation": False,
+            "crossover": "choose",
+            "crossover_prob": 1.0,
+            "parent_selection": "uniform",
+        }
         for name, stock in ours.items():
             came = getattr(self, name)
             if self.genome == "stock" and came != stock:

@@ -139,3 +139,14 @@ def test_clamped_outputs_are_neat_pythons() -> None:
     assert (kinds, outputs) == ({0}, {4})
     assert [clamped(x) for x in (-3.0, -0.5, 0.5, 3.0)] == [-1.0, -0.5, 0.5, 1.0]
     assert neat.__version__ == "2.0.0"
+
+
+def test_an_averaged_child_has_the_mean_of_matching_weights_and_biases_and_the_rest_of_the_fitter_parent() -> None:
+    config = configured(replace(ADAPTIVE, crossover="average", initial_connection="full_direct"))
+    one, other = new(config), new(config, 2)
+    other.fitness, one.connections = 5.0, one.connections[3:].copy()
+    child = child_of(config, one, other)
+    expected = other.connections["weight"].copy()
+    expected[3:] = (expected[3:] + one.connections["weight"]) / 2.0
+    np.testing.assert_allclose(child.connections["weight"], expected, rtol=1e-15)
+    np.testing.assert_allclose(child.nodes["bias"], (one.nodes["bias"] + other.nodes["bias"]) / 2.0, rtol=1e-15)
