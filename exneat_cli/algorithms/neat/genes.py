@@ -120,8 +120,8 @@ def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, sou
 def cross(fitter: Genes, other: Genes, average: bool, rng: Generator) -> Genes:
     """The genes of a child.
 
-    Matching genes mix attribute by attribute; their weights and biases may be averaged instead. All others come from the fitter parent, so that a child's graph is that
-    parent's and cannot have a cycle which that has not.
+    Matching genes mix attribute by attribute; their weights and biases may be averaged instead. All others come from
+    the fitter parent, so that a child's graph is that parent's and cannot have a cycle which that has not.
     """
     return _cross_nodes(fitter[0], other[0], average, rng), _cross_connections(fitter[1], other[1], average, rng)
 
