@@ -20,7 +20,7 @@ from importlib import metadata
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ExneatError, check_text
+from exneat_cli.errors import ExneatError, check_path
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -68,9 +68,8 @@ def run(line: CommandLine) -> int:
         ExneatError: an argument makes no sense.
     """
     plain = line.compose_only(("output",))
-    check_text("output", plain["output"], "a directory")
     states = []
-    for name, look, worst, remedy in _checks(Path(plain["output"])):
+    for name, look, worst, remedy in _checks(check_path("output", plain["output"])):
         try:
             state, found = OK, look()
         except Exception as error:  # whatever is wrong with this machine is what we are asked for

@@ -72,6 +72,7 @@ def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: 
     """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
     with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
         try:
+            config.hydra.sweep.dir = os.path.expanduser(config.hydra.sweep.dir)
             OmegaConf.resolve(config.hydra.launcher)
             _refuse_calls(OmegaConf.to_container(config), "")
             context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())

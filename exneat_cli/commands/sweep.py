@@ -25,6 +25,7 @@ from exneat_cli.errors import (
     check_choice,
     check_flag,
     check_keys,
+    check_path,
     check_section,
     check_text,
     check_whole,
@@ -87,7 +88,7 @@ def read_experiment(name: object) -> Experiment:
     own = isinstance(name, str) and name.endswith((".yaml", ".yml"))
     if not own and name not in experiment_names():
         raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
-    path = Path(str(name)) if own else shipped_directory("experiments") / f"{name}.yaml"
+    path = check_path("experiment", name) if own else shipped_directory("experiments") / f"{name}.yaml"
     try:
         content: Any = OmegaConf.to_container(OmegaConf.load(path))
     except OSError as error:

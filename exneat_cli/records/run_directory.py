@@ -249,6 +249,15 @@ def find_runs(output: Path) -> list[RunDirectory]:
     return [RunDirectory((output / manifest).parent) for manifest in sorted(glob("*/*/manifest.json", root_dir=output))]
 
 
+def runs_at(pattern: Path) -> list[RunDirectory]:
+    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it."""
+    found = [Path()]
+    for part in pattern.parts:
+        literal = [path / part for path in found if os.path.lexists(path / part)]
+        found = literal or [path / each for path in found for each in sorted(glob(part, root_dir=path))]
+    return [run for path in found if (run := RunDirectory(path)).is_there()]
+
+
 def _lock(directory: Path, descriptor: int) -> None:
     for attempt in range(1, _TRIES + 1):
         try:
