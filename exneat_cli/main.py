@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import importlib
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,6 +10,7 @@ from collections.abc import Sequence
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import listening, name_window_library, signal_heard
+from exneat_cli.output import NO_ROOM, forgiving_output
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -25,8 +23,8 @@ COMMANDS = {
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
 _RESUMABLE = "exneat: interrupted; run the same command again to resume (a single exneat train also needs resume=true)"
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
+_MAKING_FILES = ("train", "sweep", "evaluate", "report")
+"""What these say is no result, and may get lost."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -51,15 +49,15 @@ usage: exneat <command> [key=value ...]
 
 
 def program() -> int:
-    """What the installed program calls: as `main`, but a late signal changes nothing any more."""
-    code = main()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except OSError:  # a closed pipe: Python would complain at its end, with another exit code
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    """What the installed program calls: as `main`, but nobody needs to read, and a late signal changes nothing."""
+    with forgiving_output() as lost:
+        code = main()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+        sys.stdout.flush()
+        if lost:
+            print(f"exneat: standard output could not be written: {lost[0].strerror}", file=sys.stderr)
+            code = code or (0 if set(sys.argv[1:2]) & set(_MAKING_FILES) else 2)
     return code
 
 
@@ -92,17 +90,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _ended_by(error: BaseException) -> int:
     """Say what ended a command, where that is no fault of the program's; returns the exit code."""
     if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
-        with contextlib.suppress(OSError, ValueError):  # nobody reads
-            print(_RESUMABLE, file=sys.stderr, flush=True)
+        print(_RESUMABLE, file=sys.stderr, flush=True)
         return 128 + (signal_heard() or signal.SIGINT)
-    if isinstance(error, BrokenPipeError):
-        return 0
     if isinstance(error, ExneatError):
         message = str(error)
     elif isinstance(error, ImportError):
         message = f"{error}\n  python -m pip check says which libraries are missing or of another version"
-    elif isinstance(error, OSError) and error.errno in _NO_ROOM:
-        where = error.filename or "temporary files or the program's own output"
+    elif isinstance(error, OSError) and error.errno in NO_ROOM:
+        where = error.filename or "temporary files"
         message = f"{where}: {error.strerror}; check the disk, output= and TMPDIR"
     else:
         raise error

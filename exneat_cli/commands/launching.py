@@ -25,6 +25,7 @@ from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import as_worker, launching, signal_heard
+from exneat_cli.output import forgiving_output
 from exneat_cli.rollouts import keep_workers
 from exneat_cli.tasks import TASKS
 from exneat_cli.tasks.user_code import NAMED
@@ -117,7 +118,10 @@ def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None
     if signal_heard() is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
     try:
-        with contextlib.nullcontext() if workplace is None else as_worker(workplace):
+        with contextlib.ExitStack() as ending:
+            if workplace is not None:
+                ending.enter_context(forgiving_output())
+                ending.enter_context(as_worker(workplace))
             work(job)
     except Exception as error:
         if signal_heard() is not None:

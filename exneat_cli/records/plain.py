@@ -51,7 +51,7 @@ def as_yaml(content: object) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    def represent_str(self, text: str) -> yaml.Node:
+    def represent_str(self, text: str) -> yaml.ScalarNode:
         """Quote what reads as a number."""
         try:
             float(text.replace("_", ""))
