@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listening, name_window_library, signal_heard
+from exneat_cli.interruption import SIGNALS, listening, name_window_library, signal_heard
 from exneat_cli.output import NO_ROOM, forgiving_output
 
 COMMANDS = {
@@ -52,7 +52,7 @@ def program() -> int:
     """What the installed program calls: as `main`, but nobody needs to read, and a late signal changes nothing."""
     with forgiving_output() as lost:
         code = main()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         sys.stdout.flush()
         if lost:

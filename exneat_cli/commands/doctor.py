@@ -14,13 +14,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.errors import ExneatError, check_path
+from exneat_cli.interruption import scratch_directory
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -186,9 +186,9 @@ def _trial(place: Path) -> Iterator[Path]:
     """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
     from exneat_cli.records import write_whole
 
-    with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=_nearest(place)) as name:
-        write_whole(Path(name) / "trial", b"written by exneat doctor\n")
-        yield Path(name)
+    with scratch_directory(".exneat-doctor-", _nearest(place)) as path:
+        write_whole(path / "trial", b"written by exneat doctor\n")
+        yield path
 
 
 def _nearest(place: Path) -> Path:
