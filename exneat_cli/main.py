@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -76,6 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with listening():
         try:
             name_window_library()
+            _check_place()
             if command not in COMMANDS:
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
@@ -85,6 +87,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return int(importlib.import_module(f"exneat_cli.commands.{command}").run(line))
         except (Exception, KeyboardInterrupt) as error:
             return _ended_by(error)
+
+
+def _check_place() -> None:
+    """Refuse to work in a directory that is gone, where no path leads anywhere."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        why = f"the current directory cannot be used: {error.strerror}"
+        raise ExneatError(f"{why}\n  it may have been removed; change to one that is there") from error
 
 
 def _ended_by(error: BaseException) -> int:

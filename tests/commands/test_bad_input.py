@@ -278,9 +278,12 @@ def test_an_output_that_cannot_be_made_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to("nowhere")
     long = "x" * 300
     train = ["train", "budget=smoke"]
     check_refusal([*train, "output=file"], ["the directory cannot be made"], tmp_path, capfd)
+    dangling = "link: expected a directory, got a link that leads nowhere, to nowhere"
+    check_refusal([*train, "output=link"], [f"exneat: {dangling}"], tmp_path, capfd)
     check_refusal([*train, f"output={long}"], ["File name too long"], tmp_path, capfd)
     check_refusal(["inspect", f"run={long}"], ["no run is there"], tmp_path, capfd)
     if os.getuid() == 0:
@@ -288,6 +291,17 @@ def test_an_output_that_cannot_be_made_is_refused(
     else:
         tmp_path.chmod(0o500)
         check_refusal([*train, "output=out"], ["Permission denied"], tmp_path, capfd)
+
+
+@pytest.mark.parametrize("command", ["train", "inspect", "doctor"])
+def test_a_working_directory_that_is_gone_is_named(
+    command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    check_refusal([command], ["the current directory cannot be used: No such file"], tmp_path, capfd)
+    monkeypatch.chdir(tmp_path)
 
 
 def test_a_directory_that_holds_something_else_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
