@@ -114,12 +114,25 @@ def _experiment(name: str, content: Any) -> Experiment:
     for budget, runs in experiment.runs.items():
         check_choice("runs", budget, BUDGETS)
         check_whole(f"runs.{budget}", runs, 1, 10_000)
+    for part, entries in (("variants", content["variants"]), ("conditions", content["conditions"])):
+        _check_labels(part, entries)
     return replace(
         experiment,
         settings=_settings("settings", experiment.settings),
         variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
+
+
+def _check_labels(part: str, entries: Mapping[str, Any]) -> None:
+    """Refuse labels that nobody could tell apart in a figure."""
+    labels: dict[str, str] = {}
+    for name, entry in entries.items():
+        label = str(check_section(f"{part}.{name}", entry).get("label", "")).strip()
+        if "label" in entry and (not label or label in labels):
+            expected = f"another label than {part}.{labels[label]} has" if label else "a label that can be seen"
+            raise ConfigError(f"{part}.{name}.label", expected, entry["label"])
+        labels[label] = name
 
 
 def _variant(key: str, entry: Any) -> Variant:
