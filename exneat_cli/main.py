@@ -78,6 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             name_window_library()
             _check_place()
+            if command != "doctor" and os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+                raise ExneatError("NUMBA_DISABLE_JIT: expected 0, got 1: without compiled code nothing runs; unset it")
             if command not in COMMANDS:
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
@@ -107,6 +109,8 @@ def _ended_by(error: BaseException) -> int:
         message = str(error)
     elif isinstance(error, ImportError):
         message = f"{error}\n  python -m pip check says which libraries are missing or of another version"
+    elif isinstance(error, RuntimeError) and "environment variable" in str(error):  # MuJoCo's own words
+        message = f"{error}\n  unset it, or see exneat doctor"
     elif isinstance(error, OSError) and error.errno in NO_ROOM:
         where = error.filename or "temporary files"
         message = f"{where}: {error.strerror}; check the disk, output= and TMPDIR"
