@@ -12,6 +12,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import sys
 import types
 from collections.abc import Callable
 from importlib.metadata import version
@@ -96,6 +97,12 @@ def _is_all_ours(function: Callable[..., Any]) -> bool:
     return ours and all(_is_all_ours(other.py_func) for other in named if hasattr(other, "py_func"))
 
 
+@functools.cache
+def _tell_damage() -> None:
+    """Say it once in a process."""
+    print(f"exneat: a file below {cache_directory()} is damaged: compiling anew", file=sys.stderr, flush=True)
+
+
 class _Cache(FunctionCache):  # type: ignore[misc]
     """numba's cache of a function, but a damaged file or a full disk costs no more than the time to compile."""
 
@@ -104,6 +111,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # unpickling a file that was cut short raises all kinds of errors
+            _tell_damage()
             try:
                 self.flush()
             except OSError:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import sys
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 _LONGEST_VALUE = 160
@@ -83,7 +85,14 @@ def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
 def check_text(key: str, value: object, expected: str = "text") -> None:
     """Refuse anything but printable text with a `ConfigError`, which says in words what was `expected`."""
     if not isinstance(value, str) or not value or not value.isprintable():
-        raise ConfigError(key, expected, value)
+        is_plain = isinstance(value, bool | int | float)
+        raise ConfigError(key, expected, value, "in a YAML file such text stands in quotes" if is_plain else "")
+
+
+def check_path(key: str, value: object, expected: str = "a directory") -> Path:
+    """Return the path that a setting names, a leading ``~`` being the home directory; see `check_text`."""
+    check_text(key, value, expected)
+    return Path(os.path.expanduser(str(value)))
 
 
 def check_section(key: str, value: object) -> Mapping[str, Any]:

@@ -1,8 +1,9 @@
-"""Ctrl-C and SIGTERM: both raise KeyboardInterrupt in the main thread; a second Ctrl-C ends the process at once.
+"""Ctrl-C, SIGTERM and their like raise KeyboardInterrupt in the main thread; a second Ctrl-C ends the process at once.
 
-Files are written atomically and checkpoints are exact, so a run may be interrupted almost anywhere and resumes to the
-same bytes. Three things need care: compiled code that reads NumPy's generators (`uninterrupted`), libraries that
-raise another error instead (`signal_heard`), and the workers of Hydra's launchers (`launching`, `as_worker`).
+A signal that is ignored when the program begins, as `nohup` and scripts arrange it, stays ignored. Files are written
+atomically and checkpoints are exact, so a run may be interrupted almost anywhere and resumes to the same bytes. Three
+things need care: compiled code that reads NumPy's generators (`uninterrupted`), libraries that raise another error
+instead (`signal_heard`), and the workers of Hydra's launchers (`launching`, `as_worker`).
 """
 
 from __future__ import annotations
@@ -11,23 +12,34 @@ import contextlib
 import fcntl
 import importlib.util
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-_SIGNALS: tuple[int, ...] = (signal.SIGTERM, signal.SIGINT)
+SIGNALS: tuple[int, ...] = (
+    *(signal.SIGTERM, signal.SIGINT, signal.SIGHUP),
+    *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),  # from clusters, before a time limit kills
+)
+"""What interrupts."""
+_OF_GROUPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Those that a terminal or a shell sends to workers too."""
+_HELD, _STALE_SECONDS = "held", 60.0
 _heard: int | None = None
 _workplace: int | None = None
 
 
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
-    """Raise KeyboardInterrupt upon the first Ctrl-C or SIGTERM; for the main thread."""
+    """Raise KeyboardInterrupt upon the first of `SIGNALS` that was not ignored before; for the main thread."""
     global _heard
-    before, hook = _set_handlers(dict.fromkeys(_SIGNALS, _hear)), sys.unraisablehook
+    heeded = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
+    before, hook = _set_handlers(dict.fromkeys(heeded, _hear)), sys.unraisablehook
     try:
         yield
     finally:
@@ -64,7 +76,7 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     waiting: list[int] = []
-    before = _set_handlers(dict.fromkeys(_SIGNALS, lambda number, _: waiting.append(number)))
+    before = _set_handlers(dict.fromkeys(SIGNALS, lambda number, _: waiting.append(number)))
     try:
         yield
     finally:
@@ -86,11 +98,11 @@ def launching(workplace: Path) -> Iterator[None]:
     # Children inherit what the main thread blocks; this one takes the signals, which Python handles in the main one.
     threading.Thread(target=over.wait, daemon=True).start()
     _workplace = os.open(workplace, os.O_RDONLY)
-    signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _OF_GROUPS)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _OF_GROUPS)
         os.close(_workplace)
         _workplace = None
         over.set()
@@ -122,11 +134,29 @@ def as_worker(workplace: Path) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def scratch_directory(prefix: str = "exneat-", parent: Path | None = None) -> Iterator[Path]:
+    """A directory for as long as the block lasts, below TMPDIR or `parent`; those that killed processes left go too."""
+    parent = parent or Path(tempfile.gettempdir())
+    for held in parent.glob(f"{prefix}*/{_HELD}"):
+        with contextlib.suppress(OSError), open(os.open(held, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.fstat(file.fileno()).st_mtime < time.time() - _STALE_SECONDS:  # else it may be about to be locked
+                shutil.rmtree(held.parent)
+    with (
+        tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name,
+        open(Path(name) / _HELD, "wb") as file,
+    ):
+        with contextlib.suppress(OSError):  # a disk without locks, on which nobody will sweep
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield Path(name)
+
+
 def _hear(number: int, _: object) -> None:
     global _heard
     _heard, sys.unraisablehook = number, _raise_again
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # whoever sends it to a whole group has a worker hear it twice
+    ignored = [each for each in SIGNALS if each != signal.SIGINT or signal.getsignal(each) == signal.SIG_IGN]
+    _set_handlers({signal.SIGINT: signal.SIG_DFL, **dict.fromkeys(ignored, signal.SIG_IGN)})
     if _workplace is not None:
         for process in _descendants(os.getpid()):
             with contextlib.suppress(OSError):
@@ -138,7 +168,7 @@ def _hear(number: int, _: object) -> None:
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
     """Send the signal again where Python drops KeyboardInterrupt: in callbacks, such as one of the import system's."""
     if _heard is not None and isinstance(lost.exc_value, KeyboardInterrupt):
-        _set_handlers(dict.fromkeys(_SIGNALS, _hear))
+        signal.signal(_heard, _hear)
         threading.Timer(0.05, os.kill, (os.getpid(), _heard)).start()
     else:
         sys.__unraisablehook__(lost)

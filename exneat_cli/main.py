@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import importlib
 import os
 import signal
@@ -12,7 +10,8 @@ from collections.abc import Sequence
 
 from exneat_cli import __version__
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listening, name_window_library, signal_heard
+from exneat_cli.interruption import SIGNALS, listening, name_window_library, signal_heard
+from exneat_cli.output import NO_ROOM, forgiving_output
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
@@ -25,8 +24,8 @@ COMMANDS = {
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
 _RESUMABLE = "exneat: interrupted; run the same command again to resume (a single exneat train also needs resume=true)"
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Full disk, used-up quota, limit of file size: no fault of ours, wherever a library meets them."""
+_MAKING_FILES = ("train", "sweep", "evaluate", "report")
+"""What these say is no result, and may get lost."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -51,15 +50,15 @@ usage: exneat <command> [key=value ...]
 
 
 def program() -> int:
-    """What the installed program calls: as `main`, but a late signal changes nothing any more."""
-    code = main()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except OSError:  # a closed pipe: Python would complain at its end, with another exit code
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    """What the installed program calls: as `main`, but nobody needs to read, and a late signal changes nothing."""
+    with forgiving_output() as lost:
+        code = main()
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        sys.stdout.flush()
+        if lost:
+            print(f"exneat: standard output could not be written: {lost[0].strerror}", file=sys.stderr)
+            code = code or (0 if set(sys.argv[1:2]) & set(_MAKING_FILES) else 2)
     return code
 
 
@@ -78,6 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with listening():
         try:
             name_window_library()
+            _check_place()
+            if command != "doctor" and os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+                raise ExneatError("NUMBA_DISABLE_JIT: expected 0, got 1: without compiled code nothing runs; unset it")
             if command not in COMMANDS:
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
@@ -89,20 +91,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _ended_by(error)
 
 
+def _check_place() -> None:
+    """Refuse to work in a directory that is gone, where no path leads anywhere."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        why = f"the current directory cannot be used: {error.strerror}"
+        raise ExneatError(f"{why}\n  it may have been removed; change to one that is there") from error
+
+
 def _ended_by(error: BaseException) -> int:
     """Say what ended a command, where that is no fault of the program's; returns the exit code."""
     if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
-        with contextlib.suppress(OSError, ValueError):  # nobody reads
-            print(_RESUMABLE, file=sys.stderr, flush=True)
+        print(_RESUMABLE, file=sys.stderr, flush=True)
         return 128 + (signal_heard() or signal.SIGINT)
-    if isinstance(error, BrokenPipeError):
-        return 0
     if isinstance(error, ExneatError):
         message = str(error)
     elif isinstance(error, ImportError):
         message = f"{error}\n  python -m pip check says which libraries are missing or of another version"
-    elif isinstance(error, OSError) and error.errno in _NO_ROOM:
-        where = error.filename or "temporary files or the program's own output"
+    elif isinstance(error, RuntimeError) and "environment variable" in str(error):  # MuJoCo's own words
+        message = f"{error}\n  unset it, or see exneat doctor"
+    elif isinstance(error, OSError) and error.errno in NO_ROOM:
+        where = error.filename or "temporary files"
         message = f"{where}: {error.strerror}; check the disk, output= and TMPDIR"
     else:
         raise error

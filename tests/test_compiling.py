@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from exneat_cli.compiling import cache_directory, compiled, compiled_lean, with_functions
+from exneat_cli.compiling import _tell_damage, cache_directory, compiled, compiled_lean, with_functions
 from exneat_cli.tasks.grid.maze import measure_distances
 
 
@@ -60,6 +60,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(numba.core.config, "CACHE_DIR", numba.core.config.CACHE_DIR)
     cache_directory.cache_clear()
+    _tell_damage.cache_clear()
     yield tmp_path
     cache_directory.cache_clear()
 
@@ -74,13 +75,17 @@ def measure() -> str:
 
 
 @pytest.mark.parametrize("damaged", ["nothing", "*.nbi", "*.nbc"])
-def test_compiled_code_is_found_again_and_a_damaged_file_is_replaced(cache: Path, damaged: str) -> None:
+def test_compiled_code_is_found_again_and_a_damaged_file_is_replaced_and_told_once(
+    cache: Path, damaged: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert measure() == "0 1"
     assert measure() == "1 0"
-    for file in cache.rglob(damaged):
-        file.write_bytes(file.read_bytes()[:20] if damaged == "*.nbc" else b"")
-        assert measure() == "0 1"
-        assert measure() == "1 0"
+    for length in (0, 20):
+        for file in cache.rglob(damaged):
+            file.write_bytes(file.read_bytes()[:length])
+            assert measure() == "0 1"
+            assert measure() == "1 0"
+    assert capsys.readouterr().err.count("is damaged: compiling anew\n") == (damaged != "nothing")
 
 
 @pytest.mark.usefixtures("cache")

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
+import exneat_cli
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
 
 
@@ -49,3 +54,14 @@ def test_bounds_themselves_are_accepted() -> None:
     check_whole("key", 10, 0, 10)
     check_real("key", 0, 0.0, 1.0)
     check_real("key", 1.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("setting", ["MUJOCO_GL=nonsense", "NUMBA_DISABLE_JIT=1"])
+def test_an_environment_variable_that_does_not_fit_is_named_in_a_line(setting: str) -> None:
+    name, _, value = setting.partition("=")
+    command = [sys.executable, "-c", "from exneat_cli.main import program; raise SystemExit(program())", "inspect"]
+    environment = {**os.environ, name: value, "PYTHONPATH": str(Path(exneat_cli.__file__).parents[1])}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert name in done.stderr
+    assert len(done.stderr.splitlines()) <= 3

@@ -12,7 +12,7 @@ import exneat_cli
 
 PACKAGE = Path(exneat_cli.__file__).parent
 ROOMS = ["tasks", "wiring", "algorithms", "brains", "rollouts", "records", "runs", "analysis", "commands", "main"]
-FREE = {"compiling", "errors", "interruption", "seeding"}
+FREE = {"compiling", "errors", "interruption", "output", "seeding"}
 FENCES = {
     "hydra": {"main", "commands"},
     "omegaconf": {"main", "commands"},

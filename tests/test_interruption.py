@@ -1,7 +1,8 @@
-"""Ctrl-C and SIGTERM, in processes of their own where they may end one."""
+"""Ctrl-C, SIGTERM and their like, in processes of their own where they may end one."""
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -11,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import listening, signal_heard, uninterrupted
+from exneat_cli.interruption import SIGNALS, listening, scratch_directory, signal_heard, uninterrupted
 from exneat_cli.main import main
 
 PRELUDE = """
 import os, pathlib, signal, subprocess, sys, time
-from exneat_cli.interruption import as_worker, launching, listening, uninterrupted
+from exneat_cli.interruption import as_worker, launching, listening, scratch_directory, uninterrupted
 """
 
 
@@ -26,7 +27,7 @@ def in_process(code: str, *arguments: str | Path) -> subprocess.CompletedProcess
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, start_new_session=True)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_raises_keyboard_interrupt_once_and_is_known_afterwards(number: int) -> None:
     before = signal.getsignal(number)
     with listening():
@@ -36,6 +37,48 @@ def test_a_signal_raises_keyboard_interrupt_once_and_is_known_afterwards(number:
         signal.raise_signal(signal.SIGTERM)  # `timeout` sends it to the process and to its group
         assert signal_heard() == number
     assert (signal_heard(), signal.getsignal(number)) == (None, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_that_is_ignored_from_the_beginning_stays_ignored(number: signal.Signals) -> None:
+    ignore = f"signal.signal({number}, signal.SIG_IGN)"
+    work = f"""
+with listening():
+    with uninterrupted():
+        os.kill(os.getpid(), {number})
+    os.kill(os.getpid(), {number})
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    except KeyboardInterrupt:
+        os.kill(os.getpid(), {number})
+        print("went on")
+"""
+    done = in_process(f"{ignore}\nos.execv(sys.executable, [sys.executable, '-c', {PRELUDE + work!r}])")
+    assert (done.stdout, done.stderr, done.returncode) == ("went on\n", "", 0)
+
+
+@pytest.mark.parametrize("number", [*SIGNALS, signal.SIGKILL])
+def test_scratch_directories_are_gone_with_their_process_or_at_the_next_start(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    done = in_process(
+        f"""
+        with listening(), scratch_directory("x-", pathlib.Path(sys.argv[1])) as path:
+            (path / "file").touch()
+            os.kill(os.getpid(), {number})
+    """,
+        tmp_path,
+    )
+    assert done.returncode == -(signal.SIGKILL if number == signal.SIGKILL else signal.SIGINT)
+    left = list(tmp_path.iterdir())
+    assert len(left) == (number == signal.SIGKILL)
+    for path in left:
+        os.utime(path / "held", (0, 0))
+    with scratch_directory("x-", tmp_path) as own:
+        os.utime(own / "held", (0, 0))
+        with scratch_directory("x-", tmp_path) as other:
+            assert set(tmp_path.iterdir()) == {own, other}
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_second_ctrl_c_ends_the_process_at_once() -> None:

@@ -33,6 +33,7 @@ AXES = tuple(_AXIS_LABELS)
 MOST_POINTS = 100
 """Points of a curve beyond these could not be told apart, but each would cost a bootstrap."""
 MARKERS_PER_CURVE = 8
+_KEPT = "\u200b"
 _DASHED: Look = {"linestyle": "--", "linewidth": 1.2}
 _BAR: Look = {"color": GREY, "linewidth": 2.4}
 _WHAT_IS_SHOWN = {
@@ -109,12 +110,17 @@ def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> t
     return figure, list(_sentences(plan, studies, counts, axis))
 
 
+def _kept(label: str) -> str:
+    """A label that stays in legends: matplotlib leaves out those that begin with an underscore."""
+    return f"{_KEPT}{label}"
+
+
 def _add_legend(figure: Figure, width: float) -> None:
     """Add one legend for all panels, below them, so that it covers no data."""
     entries: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            entries.setdefault(str(label), handle)
+            entries.setdefault(str(label).removeprefix(_KEPT), handle)
     inches = 0.6 + 0.075 * max(len(label) for label in entries)  # an entry's, roughly: its key and its letters
     columns = max(1, min(len(entries), int(width / inches)))
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, fontsize=9)
@@ -197,7 +203,7 @@ def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_ru
         else:
             _draw_band(axes, curves, look)
         marks: Look = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
-        axes.plot(curves.index, curves.mean(axis=1), label=study.variants[variant], **look, **marks)
+        axes.plot(curves.index, curves.mean(axis=1), label=_kept(study.variants[variant]), **look, **marks)
     axes.set(xlabel=_AXIS_LABELS[axis], ylabel=f"best {study.fitness_name} so far")
     if axis == "generation":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -208,7 +214,7 @@ def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_ru
 def _draw_areas(axes: Axes, study: Study, tables: Tables) -> None:
     for place, (variant, look) in enumerate(variant_styles(study.trained_variants).items()):
         areas = tables[variant].mean().to_frame().T
-        _draw_points(axes, np.array([place]), areas, look, study.variants[variant], room=0.7, size=40)
+        _draw_points(axes, np.array([place]), areas, look, _kept(study.variants[variant]), room=0.7, size=40)
     axes.plot([], [], label="bar: mean over runs", **_BAR)
     axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
     axes.margins(x=0.08)
@@ -229,7 +235,7 @@ def _swept(panel: Panel, study: Study) -> Tables:
 def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
     styles = variant_styles(study.variants, study.baselines)
     for variant, table in tables.items():
-        axes.plot(table.index, table.mean(axis=1), label=study.variants[variant], **styles[variant])
+        axes.plot(table.index, table.mean(axis=1), label=_kept(study.variants[variant]), **styles[variant])
         if variant in study.baselines:
             continue
         _draw_band(axes, table, styles[variant])
@@ -248,7 +254,7 @@ def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables) -> No
     styles = variant_styles(study.variants, study.baselines)
     room = 0.8 / len(trained)
     for variant, table in tables.items():
-        look, label = styles[variant], study.variants[variant]
+        look, label = styles[variant], _kept(study.variants[variant])
         places = np.array([levels.index(level) for level in table.index], dtype=np.float64)
         if variant in study.baselines:
             line = {"color": look["color"], "linestyle": look["linestyle"]}

@@ -28,6 +28,7 @@ GREY = "#444444"  # of what belongs to no variant or module
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "exneat",
+    "text.parse_math": False,  # labels of users are text, dollars and backslashes too
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,

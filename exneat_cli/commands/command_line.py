@@ -1,8 +1,8 @@
 """The command line of every command: flags, and settings written key=value, which Hydra composes with YAML files.
 
 A value means the same in every command. One that Hydra's grammar cannot read is text as it stands, so that paths may
-hold brackets, quotes and letters of any script; a ``~`` at the beginning of such a text is the home directory, as in
-a shell. What stands in quotes of its own, such as ``"name='3'"``, is text whatever it looks like.
+hold brackets, quotes and letters of any script. What stands in quotes of its own, such as ``"name='3'"``, is text
+whatever it looks like, and so is what is given for a name or a path.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import contextlib
 import difflib
 import itertools
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +21,7 @@ from typing import Any
 import hydra
 import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override, Quote, QuotedString
+from hydra.core.override_parser.types import Override, Quote, QuotedString, ValueType
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
@@ -33,6 +32,8 @@ from exneat_cli.errors import ConfigError, ExneatError, check_keys
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
 _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
+_TEXTS = {"name", "output", "run", "experiment", "only", "task.model", "task.env_id"}
+"""Settings that are names and paths: what is typed for them is text, also where it looks like a number or a list."""
 _LONGEST = 300
 
 
@@ -115,7 +116,9 @@ class CommandLine:
     def show(self) -> str:
         """What is asked for with ``--cfg job``: the composition as YAML; with ``--help``: the files it comes from."""
         if self.shown == "job":
-            return yaml.safe_dump(self.compose(), sort_keys=False, allow_unicode=True).rstrip()
+            from exneat_cli.records import as_yaml  # takes longer to import than --help to answer
+
+            return as_yaml(self.compose()).rstrip()
         with self.composed() as config:
             choices = dict(reversed(config.hydra.runtime.choices.items()))
         files = {str(self.primary): "", **({"config": ""} if "task" in choices else {})}
@@ -248,10 +251,27 @@ def _parsed(text: str) -> tuple[str, Override]:
     """A setting that Hydra's grammar reads, and what it reads."""
     parser = OverridesParser.create()
     key, separator, value = text.partition("=")
-    for readable in (text, f"{key}={as_written(os.path.expanduser(value))}") if separator else (text,):
+    quoted = f"{key}={as_written(value.strip())}"
+    for readable in (text, quoted) if separator else (text,):
         with contextlib.suppress(HydraException):
-            return readable, parser.parse_override(readable)
+            override = parser.parse_override(readable)
+            if key.lstrip("+") not in _TEXTS or override.is_delete():
+                return readable, override
+            if override.is_sweep_override():
+                return _parsed_texts(readable, override)
+            is_text = override.value() is None or isinstance(override.value(), str)
+            return (readable, override) if is_text else (quoted, parser.parse_override(quoted))
     raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")
+
+
+def _parsed_texts(text: str, override: Override) -> tuple[str, Override]:
+    """Several values of a setting whose values are text."""
+    key, _, value = text.partition("=")
+    each = value.split(",")
+    if override.value_type != ValueType.SIMPLE_CHOICE_SWEEP or len(each) != len(list(override.sweep_iterator())):
+        return text, override  # commas within quotes or brackets
+    texts = f"{key}=" + ",".join(_parsed(f"{key}={one}")[0].partition("=")[2] for one in each)
+    return texts, OverridesParser.create().parse_override(texts)
 
 
 def in_words(error: BaseException, directories: Sequence[Path]) -> str:

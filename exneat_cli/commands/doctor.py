@@ -14,13 +14,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ExneatError, check_text
+from exneat_cli.errors import ExneatError, check_path
+from exneat_cli.interruption import scratch_directory
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
@@ -68,9 +68,8 @@ def run(line: CommandLine) -> int:
         ExneatError: an argument makes no sense.
     """
     plain = line.compose_only(("output",))
-    check_text("output", plain["output"], "a directory")
     states = []
-    for name, look, worst, remedy in _checks(Path(plain["output"])):
+    for name, look, worst, remedy in _checks(check_path("output", plain["output"])):
         try:
             state, found = OK, look()
         except Exception as error:  # whatever is wrong with this machine is what we are asked for
@@ -187,9 +186,9 @@ def _trial(place: Path) -> Iterator[Path]:
     """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
     from exneat_cli.records import write_whole
 
-    with tempfile.TemporaryDirectory(prefix=".exneat-doctor-", dir=_nearest(place)) as name:
-        write_whole(Path(name) / "trial", b"written by exneat doctor\n")
-        yield Path(name)
+    with scratch_directory(".exneat-doctor-", _nearest(place)) as path:
+        write_whole(path / "trial", b"written by exneat doctor\n")
+        yield path
 
 
 def _nearest(place: Path) -> Path:

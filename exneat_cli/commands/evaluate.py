@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import glob
-from pathlib import Path
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import name_code, with_sweeps
-from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
-from exneat_cli.records import RunDirectory, build
+from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_path, check_section
+from exneat_cli.records import RunDirectory, build, runs_at
 from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
 
@@ -42,11 +41,9 @@ def run(line: CommandLine) -> int:
 
 
 def _directories(pattern: object) -> list[RunDirectory]:
-    if not isinstance(pattern, str) or not pattern:
-        raise ConfigError("run", "a run directory, or a pattern such as 'outputs/ant/*'", pattern)
-    if not glob.has_magic(pattern) or Path(pattern).is_dir():
-        return [RunDirectory(Path(pattern))]
-    found = [run for path in sorted(glob.glob(pattern)) if (run := RunDirectory(Path(path))).is_there()]
-    if not found:
-        raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
-    return found
+    path = check_path("run", pattern, "a run directory, or a pattern such as 'outputs/ant/*'")
+    if found := runs_at(path):
+        return found
+    if not glob.has_magic(str(path)):
+        return [RunDirectory(path)]  # whose reader says that it is not there
+    raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")

@@ -9,7 +9,7 @@ from pathlib import Path
 from exneat_cli.algorithms import BASELINES
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import name_code
-from exneat_cli.errors import ExneatError, check_text
+from exneat_cli.errors import ExneatError, check_path
 from exneat_cli.records import RUNNING, Champion, Manifest, RunDirectory, find_runs, read_champion
 from exneat_cli.runs import read_task
 from exneat_cli.tasks import Task
@@ -33,11 +33,9 @@ def run(line: CommandLine) -> int:
         name_code(line, plain)
         _show_task(read_task(plain["task"]))
     elif plain["run"] is not None:
-        check_text("run", plain["run"], "a run directory")
-        _show(RunDirectory(Path(plain["run"])))
+        _show(RunDirectory(check_path("run", plain["run"], "a run directory")))
     else:
-        check_text("output", plain["output"], "a directory")
-        _list(Path(plain["output"]))
+        _list(check_path("output", plain["output"]))
     return 0
 
 

@@ -6,7 +6,6 @@ import contextlib
 import functools
 import os
 import sys
-import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +23,8 @@ from exneat_cli.algorithms import ALGORITHMS
 from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import Job
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import as_worker, launching, signal_heard
+from exneat_cli.interruption import as_worker, launching, scratch_directory, signal_heard
+from exneat_cli.output import forgiving_output
 from exneat_cli.rollouts import keep_workers
 from exneat_cli.tasks import TASKS
 from exneat_cli.tasks.user_code import NAMED
@@ -61,17 +61,18 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
                 with ThreadPoolExecutor(MOST_SIDE_BY_SIDE, thread_name_prefix="run") as pool:
                     return list(pool.map(here, numbers))
             return list(map(here, numbers))
-    with tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True) as workplace:
+    with scratch_directory() as workplace:
         known = [registry.copy() for registry in _REGISTRIES]
-        here = functools.partial(_do_here, Path.cwd(), known, functools.partial(_do, work, jobs, Path(workplace)))
+        here = functools.partial(_do_here, Path.cwd(), known, functools.partial(_do, work, jobs, workplace))
         with _importable():
-            return _launch(here, len(jobs), line, Path(workplace))
+            return _launch(here, len(jobs), line, workplace)
 
 
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
     """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
     with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
         try:
+            config.hydra.sweep.dir = os.path.expanduser(config.hydra.sweep.dir)
             OmegaConf.resolve(config.hydra.launcher)
             _refuse_calls(OmegaConf.to_container(config), "")
             context = HydraContext(config_loader=GlobalHydra.instance().config_loader(), callbacks=Callbacks())
@@ -116,7 +117,10 @@ def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None
     if signal_heard() is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
     try:
-        with contextlib.nullcontext() if workplace is None else as_worker(workplace):
+        with contextlib.ExitStack() as ending:
+            if workplace is not None:
+                ending.enter_context(forgiving_output())
+                ending.enter_context(as_worker(workplace))
             work(job)
     except Exception as error:
         if signal_heard() is not None:

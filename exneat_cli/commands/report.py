@@ -16,7 +16,7 @@ from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
 from exneat_cli.commands.jobs import BUDGETS
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment
-from exneat_cli.errors import ExneatError, check_choice, check_text
+from exneat_cli.errors import ExneatError, check_choice, check_path
 from exneat_cli.records import RunDirectory
 from exneat_cli.tasks import HasFullReward
 
@@ -32,7 +32,7 @@ def run(line: CommandLine) -> int:
     """
     asked = line.compose("experiment", "budget", "only", "axis", "output")
     check_choice("axis", asked["axis"], AXES)
-    check_text("output", asked["output"], "a directory")
+    asked["output"] = str(check_path("output", asked["output"]))
     own = None if asked["experiment"] is None else read_experiment(asked["experiment"])
     artefacts = _artefacts(asked, own)
     names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})

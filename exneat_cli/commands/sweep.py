@@ -25,6 +25,7 @@ from exneat_cli.errors import (
     check_choice,
     check_flag,
     check_keys,
+    check_path,
     check_section,
     check_text,
     check_whole,
@@ -87,7 +88,7 @@ def read_experiment(name: object) -> Experiment:
     own = isinstance(name, str) and name.endswith((".yaml", ".yml"))
     if not own and name not in experiment_names():
         raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
-    path = Path(str(name)) if own else shipped_directory("experiments") / f"{name}.yaml"
+    path = check_path("experiment", name) if own else shipped_directory("experiments") / f"{name}.yaml"
     try:
         content: Any = OmegaConf.to_container(OmegaConf.load(path))
     except OSError as error:
@@ -113,12 +114,25 @@ def _experiment(name: str, content: Any) -> Experiment:
     for budget, runs in experiment.runs.items():
         check_choice("runs", budget, BUDGETS)
         check_whole(f"runs.{budget}", runs, 1, 10_000)
+    for part, entries in (("variants", content["variants"]), ("conditions", content["conditions"])):
+        _check_labels(part, entries)
     return replace(
         experiment,
         settings=_settings("settings", experiment.settings),
         variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
+
+
+def _check_labels(part: str, entries: Mapping[str, Any]) -> None:
+    """Refuse labels that nobody could tell apart in a figure."""
+    labels: dict[str, str] = {}
+    for name, entry in entries.items():
+        label = str(check_section(f"{part}.{name}", entry).get("label", "")).strip()
+        if "label" in entry and (not label or label in labels):
+            expected = f"another label than {part}.{labels[label]} has" if label else "a label that can be seen"
+            raise ConfigError(f"{part}.{name}.label", expected, entry["label"])
+        labels[label] = name
 
 
 def _variant(key: str, entry: Any) -> Variant:

@@ -49,7 +49,9 @@ def make_directory(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
-        raise ExneatError(f"{path}: expected a directory, got a file") from error
+        there = next(each for each in (path, *path.parents) if os.path.lexists(each))
+        came = f"a link that leads nowhere, to {os.readlink(there)}" if there.is_symlink() else "a file"
+        raise ExneatError(f"{there}: expected a directory, got {came}") from error
     except OSError as error:
         fix = "set output= to a directory that you can write to"
         raise ExneatError(f"{path}: the directory cannot be made: {error.strerror}\n  {fix}") from error

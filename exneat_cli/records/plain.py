@@ -45,6 +45,24 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
+def as_yaml(content: object) -> str:
+    """Write plain data as YAML that also readers of other versions take for what it is: ``1e5`` is text for PyYAML."""
+    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+
+
+class _Dumper(yaml.SafeDumper):
+    def represent_str(self, text: str) -> yaml.ScalarNode:
+        """Quote what reads as a number."""
+        try:
+            float(text.replace("_", ""))
+        except ValueError:
+            return super().represent_str(text)
+        return self.represent_scalar("tag:yaml.org,2002:str", text, style="'")
+
+
+_Dumper.add_representer(str, _Dumper.represent_str)
+
+
 def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
     """Read a JSON object whose field ``format`` is `version`; returns it as the struct `kind`, and as it was.
 

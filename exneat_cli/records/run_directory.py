@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import hashlib
 import json
@@ -19,7 +20,7 @@ import msgspec
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
-from exneat_cli.records.manifest import DONE, MANIFEST_FORMAT, Manifest, Result
+from exneat_cli.records.manifest import DONE, FAILED, MANIFEST_FORMAT, Manifest, Result
 from exneat_cli.records.plain import read_json, read_yaml
 
 _NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
@@ -150,6 +151,8 @@ class RunDirectory:
                 f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
                 "  generations= can only be raised; set name= to another folder for a shorter run"
             )
+        if manifest.status == FAILED and not self.history.exists():
+            return False  # it failed before anything was trained, so there is nothing to lose
         if not (lengthen if is_done else resume):
             holds = f"a finished run of {there} generations" if is_done else f"an unfinished run ({manifest.status})"
             raise ExneatError(f"{self.path}: holds {holds}\n  add resume=true to go on from where it stopped")
@@ -201,9 +204,29 @@ class RunDirectory:
         delete(self.robustness)
         shutil.rmtree(self.plots, ignore_errors=True)
 
+    def check_writable(self) -> None:
+        """Refuse a directory in which no file can be written, before anything is computed for it.
+
+        Raises:
+            ExneatError: that is so.
+        """
+        trial = self.path / ".trial"
+        write_whole(trial, b"")
+        delete(trial)
+
     def is_there(self) -> bool:
-        """Whether the directory holds a run, as far as one can see."""
-        return os.path.exists(self.manifest)
+        """Whether the directory holds a run.
+
+        Raises:
+            ExneatError: nobody can tell, since it may not be read.
+        """
+        try:
+            os.stat(self.manifest)
+        except OSError as error:
+            if error.errno not in (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG):
+                raise ExneatError(f"{self.path}: cannot be read: {error.strerror}") from error
+            return False
+        return True
 
     def is_finished(self, full_hash: str | None = None, generations: int | None = None) -> bool:
         """Whether a run is there and done, with this hash and length if they are given.
@@ -247,6 +270,15 @@ class RunDirectory:
 def find_runs(output: Path) -> list[RunDirectory]:
     """Every run below an output root, in alphabetical order."""
     return [RunDirectory((output / manifest).parent) for manifest in sorted(glob("*/*/manifest.json", root_dir=output))]
+
+
+def runs_at(pattern: Path) -> list[RunDirectory]:
+    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it."""
+    found = [Path()]
+    for part in pattern.parts:
+        literal = [path / part for path in found if os.path.lexists(path / part)]
+        found = literal or [path / each for path in found for each in sorted(glob(part, root_dir=path))]
+    return [run for path in found if (run := RunDirectory(path)).is_there()]
 
 
 def _lock(directory: Path, descriptor: int) -> None:

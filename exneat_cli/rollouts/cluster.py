@@ -12,7 +12,6 @@ import logging
 import math
 import signal
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -20,6 +19,7 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from exneat_cli.errors import ExneatError
+from exneat_cli.interruption import scratch_directory
 from exneat_cli.rollouts.blocks import WORTH_SECONDS, Setup, blocks, run_block, versions
 from exneat_cli.rollouts.episode import Acting, Tally
 from exneat_cli.rollouts.settings import Executor
@@ -129,7 +129,7 @@ class Cluster:
         from distributed import LocalCluster
 
         # dask would leave its own directory for such files where it is.
-        scratch = ending.enter_context(tempfile.TemporaryDirectory(prefix="exneat-", ignore_cleanup_errors=True))
+        scratch = str(ending.enter_context(scratch_directory()))
         cluster: Any = LocalCluster(
             n_workers=0,
             threads_per_worker=1,

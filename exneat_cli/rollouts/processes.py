@@ -23,6 +23,7 @@ from typing import Any
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import uninterrupted
+from exneat_cli.output import forgiving_output
 from exneat_cli.rollouts.blocks import WORTH_SECONDS, Setup, blocks, run_block
 from exneat_cli.rollouts.episode import Acting, Tally
 from exneat_cli.rollouts.settings import Executor
@@ -156,7 +157,7 @@ class _Worker:
 def _serve(connection: Connection) -> None:
     """Do what a worker is there for, until the other side is gone."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with contextlib.suppress(EOFError, OSError):
+    with forgiving_output(), contextlib.suppress(EOFError, OSError):
         while True:
             world, work = connection.recv()
             answer: tuple[Any, Exception | None]

@@ -104,6 +104,7 @@ def run_robustness(
             levels = missing_levels(directory, sweep, episodes)
             if not levels:
                 continue
+            directory.check_writable()
             (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
             seeds, scores = unseen_episodes(settings, episodes), {}
             for level in levels:

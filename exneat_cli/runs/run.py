@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-import yaml
-
 from exneat_cli.errors import ExneatError
 from exneat_cli.interruption import signal_heard
 from exneat_cli.records import (
@@ -22,6 +20,7 @@ from exneat_cli.records import (
     Manifest,
     Result,
     RunDirectory,
+    as_yaml,
     provenance,
     read_checkpoints,
     write_checkpoint,
@@ -123,7 +122,7 @@ def _recorded(
         _tell_other_versions(before, progress)
         directory.forget_what_was_derived()
     try:
-        directory.begin(yaml.safe_dump(settings.to_plain(), sort_keys=False), manifest, settings.task.files())
+        directory.begin(as_yaml(settings.to_plain()), manifest, settings.task.files())
         progress.start(directory.path.name, settings.generations)
         if settings.geometry.name == "auto" and settings.algorithm.modular:
             vector = settings.geometry.subpopulations(settings.task.parts)

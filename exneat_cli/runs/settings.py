@@ -19,7 +19,7 @@ from exneat_cli.algorithms import (
     ExNEAT,
     Problem,
 )
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_section, check_text, check_whole
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_path, check_section, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
 from exneat_cli.tasks import TASKS, AntTask, HasBatch, HasInitialPose, Task
@@ -69,7 +69,7 @@ class RunSettings:
         validation_episodes: per team of the hall of fame; in a race, of the last teams in it.
         test_episodes: per brain that is tested.
         name: directory below `output`; None takes the task's name.
-        output: root of all run directories.
+        output: root of all run directories; a leading ``~`` is the home directory.
         resume: go on with an unfinished run, or make a finished one longer.
         checkpoint_every: generations from one checkpoint to the next.
         task_kind: ``package.module:Class`` of the task if that is how its user names it, else None; plain data has it
@@ -120,7 +120,8 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
-        check_text("output", self.output, "a directory, without control characters")
+        output = check_path("output", self.output, "a directory, without control characters")
+        object.__setattr__(self, "output", str(output))
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)

@@ -238,3 +238,12 @@ def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_pat
             colour = handles.get_color() if hasattr(handles, "get_color") else handles.get_facecolor()[0][:3]
             found.add(to_hex(colour))
     assert len(found) == 1
+
+
+@pytest.mark.parametrize("kind", ["training", "robustness", "cluster", "area"])
+def test_labels_of_users_are_shown_as_they_are(tmp_path: Path, kind: str) -> None:
+    labels = {"neat": "_NEAT", "exneat": r"$\foo$ $$ 5%", "random": "__$"}
+    draw_figure(a_plan(kind), {"track": a_study(tmp_path, variants=labels)}, tmp_path / "report")
+    drawn = (tmp_path / "report" / f"figure-4.3-{kind}.5.svg").read_text()
+    for variant, label in labels.items():
+        assert (f"<!-- {label} -->" in drawn) == (variant != "random" or kind in ("robustness", "cluster"))

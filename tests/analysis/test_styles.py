@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
+import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+import exneat_cli
 from exneat_cli.analysis.styles import save_figure, tick_levels, variant_styles
 
 ANT = ("neat", "single_unlinked", "single_linked", "all_unlinked", "all_linked", "fb", "lr", "cross")
@@ -54,3 +59,19 @@ def test_settings_of_a_users_own_change_no_figure(tmp_path: Path) -> None:
             save_figure(Figure(), tmp_path / name)
     for kind in ("png", "svg"):
         assert (tmp_path / f"one.{kind}").read_bytes() == (tmp_path / f"other.{kind}").read_bytes()
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense", None])
+def test_a_backend_that_is_not_there_is_done_without_and_settings_that_cannot_be_read_are_named(
+    backend: str | None, tmp_path: Path
+) -> None:
+    if backend is None:
+        (tmp_path / "matplotlibrc").write_bytes(b"\xff\xfe")
+    code = f"import exneat_cli.analysis, os; assert os.environ.get('MPLBACKEND') == {backend!r}"
+    environment = {key: value for key, value in os.environ.items() if key != "MPLBACKEND"}
+    environment |= {"MPLBACKEND": backend} if backend else {}
+    environment["PYTHONPATH"] = str(Path(exneat_cli.__file__).parents[1])
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == (backend is None), done.stderr
+    assert ("ExneatError: matplotlib cannot be loaded: 'utf-8' codec" in done.stderr) == (backend is None)

@@ -10,8 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from exneat_cli.commands.command_line import read_command_line
+from exneat_cli.commands.jobs import read_job
+from exneat_cli.errors import ConfigError, check_path
 from exneat_cli.main import main
-from tests.commands.refusals import check_message, check_refusal
+from exneat_cli.runs import RunSettings
+from exneat_cli.tasks.robots.models import path_of
+from tests.commands.refusals import TASK, check_message, check_refusal
 
 TRAIN = {
     # what is given besides budget=smoke output=out, and what the message must name
@@ -86,6 +91,7 @@ TRAIN = {
     "'name=a b'": "name: expected one folder name of letters, digits, '.', '_' and '-', got 'a b'",
     "name=a}": "got 'a}'",
     "name=ä": "got 'ä'",
+    "name=[a]": "got '[a]'",
     "'name=${a'": "name='${a'",
     "'name=${nope:1}'": "name: Unsupported interpolation type nope",
     "'name=${name}'": "name: Recursive interpolation",
@@ -95,7 +101,6 @@ TRAIN = {
     "name=???": "name: Missing mandatory value",
     "output=": "output: expected a directory",
     "output=null": "output: expected a directory",
-    "output=[a]": "output: expected a directory",
     "task=atn": "task=atn: no such option; known: ant, custom, foraging, general_maze, gym, hunting, robot, track_maze",
     "task=": "task=: no such option; known: ant",
     "task=null": "task: expected the name of an option, got None",
@@ -211,7 +216,7 @@ OTHERS = {
     "'\x1b[31mfly'": "fly: expected a command",
     "inspect run=nowhere": "run=nowhere: no run is there",
     "inspect run=": "run: expected a run directory",
-    "inspect run=3": "run: expected a run directory, got 3",
+    "inspect run=3": "run=3: no run is there",
     "inspect somewhere": "somewhere: expected key=value",
     "inspect outptu=x": "did you mean output?",
     "inspect --all": "--all: unknown flag",
@@ -225,7 +230,7 @@ OTHERS = {
     "evaluate run=a_file sweep=gap": "run=a_file: no run is there",
     "evaluate run=no*thing sweep=gap": "run: expected a run directory, or a pattern",
     "evaluate run=[a sweep=gap": "run: expected a run directory, or a pattern that fits some, got '[a'",
-    "evaluate run=3 sweep=gap": "run: expected a run directory, or a pattern such as 'outputs/ant/*', got 3",
+    "evaluate run=3 sweep=gap": "run=3: no run is there",
     "evaluate --what sweep=gap": "--what: unknown flag",
     "report": "output=outputs: no finished run of ant",
     "report budget=huge": "budget=huge: no such option; known: paper, quick, smoke",
@@ -273,9 +278,12 @@ def test_an_output_that_cannot_be_made_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to("nowhere")
     long = "x" * 300
     train = ["train", "budget=smoke"]
     check_refusal([*train, "output=file"], ["the directory cannot be made"], tmp_path, capfd)
+    dangling = "link: expected a directory, got a link that leads nowhere, to nowhere"
+    check_refusal([*train, "output=link"], [f"exneat: {dangling}"], tmp_path, capfd)
     check_refusal([*train, f"output={long}"], ["File name too long"], tmp_path, capfd)
     check_refusal(["inspect", f"run={long}"], ["no run is there"], tmp_path, capfd)
     if os.getuid() == 0:
@@ -283,6 +291,17 @@ def test_an_output_that_cannot_be_made_is_refused(
     else:
         tmp_path.chmod(0o500)
         check_refusal([*train, "output=out"], ["Permission denied"], tmp_path, capfd)
+
+
+@pytest.mark.parametrize("command", ["train", "inspect", "doctor"])
+def test_a_working_directory_that_is_gone_is_named(
+    command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    check_refusal([command], ["the current directory cannot be used: No such file"], tmp_path, capfd)
+    monkeypatch.chdir(tmp_path)
 
 
 def test_a_directory_that_holds_something_else_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -307,7 +326,11 @@ def test_a_bad_job_of_a_multirun_leaves_the_others_alone(tmp_path: Path, capfd: 
 
 @pytest.mark.parametrize(
     ("output", "place"),
-    [("runs [1] (é)", "runs [1] (é)"), ("'3'", "3"), ("~/x", "home/x"), ("'~'", "~"), ("it's", "it's")],
+    [
+        *(("runs [1] (é)", "runs [1] (é)"), ("'Läufe'", "Läufe"), ("it's", "it's"), ("[a]", "[a]")),
+        *(("'3'", "3"), ("2026_11", "2026_11"), ("1e5", "1e5"), ("true", "true")),
+        *(("~/x", "home/x"), ("'~/x'", "home/x")),
+    ],
 )
 def test_a_value_means_the_same_in_every_command_whatever_its_characters(
     output: str,
@@ -325,8 +348,11 @@ def test_a_value_means_the_same_in_every_command_whatever_its_characters(
     (run,) = (tmp_path / place / "track_maze").iterdir()
     assert main(["inspect", f"output={output}"]) == 0
     assert run.name in capfd.readouterr().out
-    asked = output.removesuffix("'") + f"/track_maze/{run.name}" + "'" * output.endswith("'")
-    assert main(["evaluate", f"run={asked}", "sweep=gap", "sweep.levels=[1]", "sweep.episodes=1"]) == 0
+    quote = "'" * output.endswith("'")
+    evaluate = ["evaluate", "sweep=gap", "sweep.levels=[1]", "sweep.episodes=1"]
+    for fitting in (run.name, "*"):
+        assert main([*evaluate, f"run={output.removesuffix(quote)}/track_maze/{fitting}{quote}"]) == 0
+    assert "robustness.csv: 1 levels tested now" in capfd.readouterr().out
     check_refusal(["report", f"output={output}"], [place, "no finished run of ant"], tmp_path, capfd)
 
 
@@ -336,3 +362,34 @@ def test_the_installed_program_refuses_in_the_same_words(tmp_path: Path) -> None
     check_message(done.returncode, done.stderr, "seed: expected")
     assert not done.stdout
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_typed_for_a_name_stays_as_it_was_also_in_a_multirun_and_in_the_runs_own_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+    train = ["train", "task=track_maze", "algorithm=motionless", "budget=smoke"]
+    assert main([*train, "-m", "name=2026_11_26,1e5"]) == 0
+    assert {path.name for path in Path("outputs").iterdir()} == {"2026_11_26", "1e5"}
+    (run,) = Path("outputs/1e5").iterdir()
+    assert main(["train", "--config-path", str(run)]) == 0
+    assert "finished already" in capfd.readouterr().out
+
+
+def test_a_path_in_a_file_of_ones_own_begins_at_home_where_a_tilde_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "task").mkdir()
+    (tmp_path / "task" / "own.yaml").write_bytes(TASK + b"output: ~/runs\n")
+    line = read_command_line("train", ["--config-dir", str(tmp_path), "task=own", "budget=smoke"])
+    settings = read_job("", line).settings
+    assert settings.directory.path.is_relative_to(tmp_path / "home" / "runs")
+    for make in (lambda path: RunSettings(output=path).output, lambda path: check_path("run", path)):
+        assert Path(make("~/x")) == tmp_path / "home" / "x"
+    with pytest.raises(ConfigError, match=r"got '~/no\.xml'"):
+        path_of("~/no.xml")
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "yes.xml").touch()
+    assert path_of("~/yes.xml").exists()

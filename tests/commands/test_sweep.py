@@ -260,3 +260,11 @@ def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_pa
     manifest = job.settings.directory.manifest
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "status": "running"}))
     assert not job.is_finished()
+
+
+@pytest.mark.parametrize("label", ["", " ", "NEAT", " NEAT "])
+def test_labels_that_nobody_could_tell_apart_are_refused(tmp_path: Path, label: str) -> None:
+    neat, exneat = SMALL["variants"].values()  # type: ignore[attr-defined]
+    write(tmp_path, variants={"neat": neat, "exneat": {**exneat, "label": label}})
+    with pytest.raises(ExneatError, match=r"small\.yaml: variants\.\w+\.label: expected "):
+        read_experiment(str(tmp_path / "small.yaml"))

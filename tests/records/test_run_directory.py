@@ -71,9 +71,23 @@ def test_a_run_is_finished_if_it_is_done_and_the_one_that_is_meant(tmp_path: Pat
 @pytest.mark.parametrize("status", ["running", "failed", "interrupted"])
 def test_an_unfinished_run_is_refused_naming_resume(tmp_path: Path, status: str) -> None:
     run = started(tmp_path / "ant" / "run", status)
+    run.history.touch()
     with pytest.raises(ExneatError, match=f"{status}.*\n.*resume=true"):
         claim(run)
     assert not claim(run, resume=True)
+
+
+def test_a_run_that_failed_before_anything_was_trained_blocks_nothing(tmp_path: Path) -> None:
+    assert not claim(started(tmp_path / "ant" / "run", "failed"))
+
+
+def test_a_run_that_cannot_be_read_is_not_taken_for_none(tmp_path: Path) -> None:
+    run = started(tmp_path / "ant" / "run", "done")
+    run.manifest.unlink()
+    assert not run.is_there()
+    run.manifest.symlink_to(run.manifest)
+    with pytest.raises(ExneatError, match="run: cannot be read: Too many levels of symbolic links"):
+        run.is_there()
 
 
 @pytest.mark.parametrize("status", ["done", "running"])

@@ -87,3 +87,16 @@ def test_failed_episodes_of_a_level_are_counted_once_though_its_rows_were_lost(
             run_robustness(directory, [sweep], episodes=3, executor=SERIAL)
     assert run_robustness(directory, [sweep], episodes=3, executor=SERIAL) == 2
     assert directory.read_manifest().failed_robustness_episodes == {"p_m=0.0, 3 episodes": 2, "p_m=0.5, 3 episodes": 2}
+
+
+def test_a_run_that_cannot_be_written_is_refused_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, content: bytes) -> None:
+        raise ExneatError(f"{path}: could not be written: Permission denied")
+
+    directory = train(a_run(tmp_path)).directory
+    monkeypatch.setattr("exneat_cli.records.run_directory.write_whole", refuse)
+    monkeypatch.setattr(robustness, "Runner", None)
+    with pytest.raises(ExneatError, match="Permission denied"):
+        run_robustness(directory, [Sweep("p_m", "task.p_m", (0.0,))], episodes=1, executor=SERIAL)

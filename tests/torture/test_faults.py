@@ -51,4 +51,4 @@ def test_a_full_disk_that_a_library_meets_is_one_line(
 
     monkeypatch.setattr("exneat_cli.main.importlib.import_module", full)
     assert main(["doctor"]) == 2
-    assert capsys.readouterr().err.startswith("exneat: temporary files or the program's own output: No space left")
+    assert capsys.readouterr().err.startswith("exneat: temporary files: No space left")

@@ -45,6 +45,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         self.action_space = gymnasium.spaces.Discrete(len(MOVES))
         self._simulation = made.open(training=False)
         self._observation = np.zeros(made.observation_size)
+        self._is_reset = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -52,6 +53,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         """Draw a new world from the environment's own generator."""
         super().reset(seed=seed, options=options)
         self._simulation.reset(self._simulation.world, self.np_random)
+        self._is_reset = True
         return self._observe(), {}
 
     def step(self, action: np.int64) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
@@ -59,7 +61,10 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
         Raises:
             ValueError: there is no such action.
+            ResetNeeded: no world was drawn yet.
         """
+        if not self._is_reset:
+            raise gymnasium.error.ResetNeeded("step: expected a call of reset before the first step, got none")
         if not self.action_space.contains(action):
             raise ValueError(f"action: expected a whole number from 0 to {len(MOVES) - 1}, got {action!r}")
         terms = np.zeros(len(self.task.terms))

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import mujoco
 
-from exneat_cli.errors import ConfigError
+from exneat_cli.errors import ConfigError, check_path
 
 LARGEST = 64 * 2**20
 """Bytes that a model and the files it includes may have together."""
@@ -118,7 +118,7 @@ def path_of(model: str) -> Path:
     """
     if model in NAMED:
         return _shipped(model)
-    path = Path(model).expanduser()
+    path = check_path("task.model", model, "an MJCF file")
     if not path.is_file():
         fix = f"or one of the names {', '.join(NAMED)}"
         raise ConfigError("task.model", "an MJCF file that exists", model, fix)

@@ -67,6 +67,15 @@ def test_an_action_that_does_not_exist_is_refused(action: Any) -> None:
 
 
 @pytest.mark.parametrize("world", WORLDS)
+def test_a_step_before_the_first_reset_is_refused(world: str) -> None:
+    env = gymnasium.make(world).unwrapped
+    with pytest.raises(gymnasium.error.ResetNeeded, match="expected a call of reset"):
+        env.step(0)
+    env.reset(seed=0)
+    env.step(0)
+
+
+@pytest.mark.parametrize("world", WORLDS)
 def test_observations_are_clipped_neighbours(world: str) -> None:
     env: Any = gymnasium.make(world, **PARAMETERS[world])
     observation, _ = env.reset(seed=1)
