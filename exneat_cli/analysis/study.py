@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,7 @@ class Study:
         conditions: name -> label.
         sweeps: name of a robustness sweep -> label of its axis, with unit.
         runs: all of them.
+        references: variant -> the one that it is compared with, for those that are not compared with the first.
         levels: sweep -> the planned levels; None takes whatever levels there are.
         sweep_episodes: the planned test episodes per level; None takes any number.
     """
@@ -77,13 +78,19 @@ class Study:
     conditions: Mapping[str, str]
     sweeps: Mapping[str, str]
     runs: tuple[PlannedRun, ...]
+    references: Mapping[str, str] = field(default_factory=dict)
     levels: Mapping[str, tuple[float, ...]] | None = None
     sweep_episodes: int | None = None
 
     @property
     def first_variant(self) -> str:
-        """The variant that the others are compared with."""
+        """The variant that the others are compared with, unless they have a reference of their own."""
         return next(iter(self.variants))
+
+    def reference_of(self, variant: str) -> str:
+        """The variant that this one is compared with; itself if others are compared with it."""
+        own = variant == self.first_variant or variant in self.references.values()
+        return variant if own else self.references.get(variant, self.first_variant)
 
     @property
     def trained_variants(self) -> tuple[str, ...]:
@@ -93,7 +100,9 @@ class Study:
     def only(self, trained: Collection[str]) -> Study:
         """The same study with these trained variants alone, and its baselines."""
         kept = {name: label for name, label in self.variants.items() if name in trained or name in self.baselines}
-        return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
+        references = {name: other for name, other in self.references.items() if {name, other} <= set(kept)}
+        runs = tuple(run for run in self.runs if run.variant in kept)
+        return replace(self, variants=kept, references=references, runs=runs)
 
     @functools.cached_property
     def finished(self) -> Mapping[PlannedRun, Manifest]:

@@ -127,6 +127,7 @@ def _study(experiment: Experiment, budget: str, command: str, line: CommandLine)
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps={name: sweep.label for name, sweep in sweeps.items()},
         runs=tuple(runs),
+        references={name: variant.against for name, variant in experiment.variants.items() if variant.against},
         levels={name: sweep.levels for name, sweep in sweeps.items()},
         sweep_episodes=swept[0].episodes if swept else None,
     )

@@ -41,12 +41,16 @@ _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "h
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the things compared; without `runs` it has as many seeds as the experiment says."""
+    """One of the things compared, with the first variant or with `against`.
+
+    Without `runs` it has as many seeds as the experiment says.
+    """
 
     label: str
     settings: Mapping[str, Any]
     runs: int | None = None
     swept: bool = True
+    against: str | None = None
 
 
 @dataclass(frozen=True)
@@ -116,15 +120,18 @@ def _experiment(name: str, content: Any) -> Experiment:
     return replace(
         experiment,
         settings=_settings("settings", experiment.settings),
-        variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
+        variants={key: _variant(f"variants.{key}", entry, content) for key, entry in content["variants"].items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
 
 
-def _variant(key: str, entry: Any) -> Variant:
+def _variant(key: str, entry: Any, content: Any) -> Variant:
     variant = build(Variant, entry, f"{key}.")
     check_text(f"{key}.label", variant.label)
     check_flag(f"{key}.swept", variant.swept)
+    if variant.against is not None:
+        others = [name for name in content["variants"] if f"variants.{name}" != key]
+        check_choice(f"{key}.against", variant.against, others)
     if variant.runs is not None:
         check_whole(f"{key}.runs", variant.runs, 1, 10_000)
     return replace(variant, settings=_settings(f"{key}.settings", variant.settings))
