@@ -30,6 +30,8 @@ def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[st
     # Labels of variants may hold commas.
     listed = "; ".join(f"{study.variants[variant]} {number_range(runs)}" for variant, runs in counts.items())
     yield f"Budget {study.budget}; finished runs per condition: {listed}."
+    if taken := sum(run.condition in conditions and run.variant in variants for run in study.published):
+        yield f"{taken} of these runs are published rows of experiments/results."
     if is_published and study.budget != "paper":
         yield "The published figures rest on a larger budget."
     if meanings := [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]:

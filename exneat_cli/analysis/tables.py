@@ -96,7 +96,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
         MissingRunsError: no run is finished at all.
         ExneatError: a file cannot be written.
     """
-    if not study.finished:
+    if not study.reached:
         what = f"{study.experiment}, budget {study.budget}: no finished run to compare"
         raise MissingRunsError(f"{what}\n  {study.command}")
     conditions = [name for name in study.conditions if (study.results["condition"] == name).any()]
