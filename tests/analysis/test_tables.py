@@ -184,7 +184,7 @@ def test_a_bar_in_a_label_does_not_break_the_markdown(tmp_path: Path) -> None:
 
 def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(tmp_path: Path) -> None:
     plans = [each for each in read_catalogue(CATALOGUE).values() if isinstance(each, TablePlan)]
-    assert len(plans) == 5
+    assert len(plans) == 6
     levels = {(sweep, 0.2): (700.0, 1600.0) for sweep in ("reset_noise", "sensor_noise")}
     for each in plans:
         names = {row.variant: row.variant for row in each.rows}, {row.condition: row.condition for row in each.rows}
