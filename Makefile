@@ -9,6 +9,8 @@ BIN := $(VENV)/bin
 # Reports take the largest budget that has runs unless BUDGET is given.
 OF_BUDGET := $(if $(BUDGET),budget=$(BUDGET))
 BUDGET ?= quick
+# true: each finished run's row goes into experiments/results.
+PUBLISH ?= false
 EXPERIMENTS := track_maze general_maze foraging hunting ant
 # One run per core, each on one thread: evolution itself is serial.
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
@@ -35,15 +37,16 @@ check: $(VENV)/installed ## style, imports and types
 tests: $(VENV)/installed ## tests alone
 	$(BIN)/pytest -n 2 --dist loadfile
 
-docs: $(VENV)/installed ## build the manual into docs/_build/html; a warning is an error
+docs: $(VENV)/installed ## build the manual into docs/_build/html, with the results as published; a warning is an error
+	$(BIN)/python docs/make_results.py
 	$(BIN)/sphinx-build -q -W --keep-going -n -b html docs docs/_build/html
 
 format: $(VENV)/installed ## bring the code into shape
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-sweep-%: $(VENV)/installed ## all runs of one experiment that are missing, e.g. make sweep-ant BUDGET=paper
-	$(BIN)/exneat sweep experiment=$* budget=$(BUDGET) $(SIDE_BY_SIDE)
+sweep-%: $(VENV)/installed ## all runs of one experiment that are missing, e.g. make sweep-ant BUDGET=paper PUBLISH=true
+	$(BIN)/exneat sweep experiment=$* budget=$(BUDGET) publish=$(PUBLISH) $(SIDE_BY_SIDE)
 
 reproduce: $(VENV)/installed ## train what is missing of all experiments, then report: make reproduce BUDGET=quick|paper
 	@status=0; for experiment in $(EXPERIMENTS); do $(MAKE) --no-print-directory sweep-$$experiment || status=1; done; \

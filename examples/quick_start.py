@@ -5,7 +5,7 @@ from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import Foraging
 
 for algorithm in (NEAT(), ExNEAT()):
-    settings = RunSettings(task=Foraging(size=7), algorithm=algorithm, generations=10, episodes=10)
+    settings = RunSettings(task=Foraging(), algorithm=algorithm, generations=10, episodes=10)
     finished = train(settings)
     print(finished.directory.path)
     print(finished.summary)

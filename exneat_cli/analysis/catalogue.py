@@ -65,12 +65,14 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ``efficiency`` (first generation, from 1, at which the mean best so far reaches the final mean of the first
             variant), or ``robustness``.
         sweep, level, value: of a robustness sweep, with one of `VALUES`; needed there alone.
+        minus: a variant whose mean in the same condition is taken away, e.g. a baseline.
     """
 
     of: str
     sweep: str | None = None
     level: float | None = None
     value: str = "fitness"
+    minus: str | None = None
 
     def __post_init__(self) -> None:
         check_choice("of", self.of, QUANTITIES)

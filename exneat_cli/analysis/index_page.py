@@ -88,7 +88,7 @@ def _facts(study: Study) -> dict[str, Any]:
     rows = []
     for variant, label in study.variants.items():
         seeds = [run.seed for run in study.runs if run.variant == variant]
-        finished = sum(run.variant == variant for run in study.finished)
+        finished = sum(run.variant == variant for run in study.reached)
         ends = dict.fromkeys((min(seeds, default=""), max(seeds, default="")))
         rows.append((label, str(finished), str(len(seeds)), " to ".join(map(str, ends))))
     versions: dict[str, set[str]] = {}
@@ -108,7 +108,7 @@ def _facts(study: Study) -> dict[str, Any]:
 def _missing(studies: Mapping[str, Study], missing: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
     """(name, what it lacks, command that makes it) of studies and artefacts."""
     for study in studies.values():
-        unfinished = len(study.runs) - len(study.finished)
+        unfinished = len(study.runs) - len(study.reached)
         if unfinished:
             yield study.experiment, f"{unfinished} of {len(study.runs)} runs are not finished", study.command
     for name, message in missing.items():

@@ -59,6 +59,8 @@ def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path,
         _check_panel(plan, panel, studies)
     if plan.variants:
         studies = {name: study.only(plan.variants) for name, study in studies.items()}
+    if plan.kind == "network" or axis != "generation":
+        studies = {name: study.on_disk() for name, study in studies.items()}
     figure, sentences = _draw_champions(plan, studies) if plan.kind == "network" else _draw_panels(plan, studies, axis)
     paths = save_figure(figure, directory / plan.name)
     return Built(plan.name, plan.title, " ".join(filter(None, [f"{plan.title}.", *sentences])), tuple(paths))

@@ -108,27 +108,34 @@ def efficiency(curve: Values, target: float) -> int | None:
     return int(reached[0]) + 1 if len(reached) else None
 
 
-def compare(values: Mapping[str, Values], untrained: Collection[str] = ()) -> pd.DataFrame:
-    """Summarise variants, each with one value per run or none, and compare each with the first one.
+def least_p(one: int, other: int) -> float:
+    """The smallest two-sided p that so many runs a side can reach: every run of one side beats all of the other."""
+    return min(1.0, 2.0 / math.comb(one + other, one))
 
-    Those in `untrained` have no p: they are no competitors, so they must not cost the others power.
+
+def compare(
+    values: Mapping[str, Values], untrained: Collection[str] = (), references: Mapping[str, str] | None = None
+) -> pd.DataFrame:
+    """Summarise variants, each with one value per run or none, and compare each with its reference.
+
+    `references` names those of variants that are not compared with the first one; what others are compared with is not
+    compared itself. Those in `untrained` have no p: they are no competitors, so they must not cost the others power.
 
     Returns:
         One row per variant, NaN for what does not exist. Columns: runs (how many values), mean, low and high (ends of
-        the mean's 95% interval), iqm (interquartile mean), p_holm (`mann_whitney_p` against the first variant,
-        corrected by `holm`), a12 (chance that a run of this variant beats one of the first).
+        the mean's 95% interval), iqm (interquartile mean), margin (mean less that of the reference), p_holm
+        (`mann_whitney_p` against the reference, corrected by `holm`), a12 (chance that a run of this variant beats one
+        of the reference).
     """
-    first, reference = next(iter(values.items()), ("", ()))
-    rows = [
-        (
-            len(runs),
-            mean(runs),
-            *bootstrap_interval(runs),
-            interquartile_mean(runs),
-            math.nan if variant == first or variant in untrained else mann_whitney_p(runs, reference),
-            math.nan if variant == first else a12(runs, reference),
-        )
-        for variant, runs in values.items()
-    ]
-    table = pd.DataFrame(rows, list(values), ["runs", "mean", "low", "high", "iqm", "p_holm", "a12"])
+    first, references = next(iter(values), ""), references or {}
+    rows = []
+    for variant, runs in values.items():
+        reference = values[references.get(variant, first)]
+        own = (len(runs), mean(runs), *bootstrap_interval(runs), interquartile_mean(runs))
+        if variant == first or variant in references.values():
+            rows.append((*own, math.nan, math.nan, math.nan))
+        else:
+            p = math.nan if variant in untrained else mann_whitney_p(runs, reference)
+            rows.append((*own, mean(runs) - mean(reference), p, a12(runs, reference)))
+    table = pd.DataFrame(rows, list(values), ["runs", "mean", "low", "high", "iqm", "margin", "p_holm", "a12"])
     return table.assign(p_holm=holm(table["p_holm"].astype(float)))

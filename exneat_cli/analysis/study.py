@@ -1,7 +1,7 @@
 """What a report is made from: the planned runs of experiments, what their files hold, and what their training spent.
 
-A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, so
-runs with other settings never slip in, whatever else lies in the same folder.
+A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, or, where they
+are not there, among the published rows of the same settings' hash; so runs with other settings never slip in.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import HISTORY_COLUMNS, Manifest, RobustnessRow, RunDirectory, read_robustness
+from exneat_cli.records import HISTORY_COLUMNS, Manifest, PublishedRun, RobustnessRow, RunDirectory, read_robustness
 
 BEST = 5
 """How many runs of each variant the thesis tests: those best on validation; Zhang (2025), table 5.5."""
@@ -37,6 +37,7 @@ class PlannedRun:
         condition, variant, seed: its place in the experiment.
         directory: where its files are, or will be.
         generations: how long it is trained; None takes any length.
+        configuration_hash: that of its settings, by which a published row is known.
     """
 
     condition: str
@@ -44,6 +45,7 @@ class PlannedRun:
     seed: int
     directory: RunDirectory
     generations: int | None = None
+    configuration_hash: str | None = None
 
 
 @dataclass(frozen=True)
@@ -62,8 +64,10 @@ class Study:
         conditions: name -> label.
         sweeps: name of a robustness sweep -> label of its axis, with unit.
         runs: all of them.
+        references: variant -> the one that it is compared with, for those that are not compared with the first.
         levels: sweep -> the planned levels; None takes whatever levels there are.
         sweep_episodes: the planned test episodes per level; None takes any number.
+        rows: published runs of the experiment, of any budget and settings.
     """
 
     experiment: str
@@ -77,13 +81,20 @@ class Study:
     conditions: Mapping[str, str]
     sweeps: Mapping[str, str]
     runs: tuple[PlannedRun, ...]
+    references: Mapping[str, str] = field(default_factory=dict)
     levels: Mapping[str, tuple[float, ...]] | None = None
     sweep_episodes: int | None = None
+    rows: tuple[PublishedRun, ...] = ()
 
     @property
     def first_variant(self) -> str:
-        """The variant that the others are compared with."""
+        """The variant that the others are compared with, unless they have a reference of their own."""
         return next(iter(self.variants))
+
+    def reference_of(self, variant: str) -> str:
+        """The variant that this one is compared with; itself if others are compared with it."""
+        own = variant == self.first_variant or variant in self.references.values()
+        return variant if own else self.references.get(variant, self.first_variant)
 
     @property
     def trained_variants(self) -> tuple[str, ...]:
@@ -93,7 +104,9 @@ class Study:
     def only(self, trained: Collection[str]) -> Study:
         """The same study with these trained variants alone, and its baselines."""
         kept = {name: label for name, label in self.variants.items() if name in trained or name in self.baselines}
-        return replace(self, variants=kept, runs=tuple(run for run in self.runs if run.variant in kept))
+        references = {name: other for name, other in self.references.items() if {name, other} <= set(kept)}
+        runs = tuple(run for run in self.runs if run.variant in kept)
+        return replace(self, variants=kept, references=references, runs=runs)
 
     @functools.cached_property
     def finished(self) -> Mapping[PlannedRun, Manifest]:
@@ -101,9 +114,30 @@ class Study:
         done = [run for run in self.runs if run.directory.is_finished(generations=run.generations)]
         return {run: run.directory.read_manifest() for run in done}
 
+    @functools.cached_property
+    def published(self) -> Mapping[PlannedRun, PublishedRun]:
+        """The runs that are not there, but whose published row is of the same settings."""
+        rows = {row.place: row for row in self.rows}
+        known = {run: rows.get((run.condition, run.variant, run.seed, self.budget)) for run in self.runs}
+        return {
+            run: row
+            for run, row in known.items()
+            if row is not None and run not in self.finished and row.configuration_hash == run.configuration_hash
+            if run.generations in (None, row.generations)
+        }
+
+    @functools.cached_property
+    def reached(self) -> tuple[PlannedRun, ...]:
+        """The runs that are finished or published, in their order."""
+        return tuple(run for run in self.runs if run in self.finished or run in self.published)
+
+    def on_disk(self) -> Study:
+        """The same study without published rows, which lack champions and the axes of episodes and steps."""
+        return replace(self, rows=())
+
     def of(self, condition: str, variant: str) -> tuple[PlannedRun, ...]:
-        """Finished runs of one variant in one condition, in the order of their seeds."""
-        return tuple(run for run in self.finished if (run.condition, run.variant) == (condition, variant))
+        """Runs of one variant in one condition that are finished or published, in the order of their seeds."""
+        return tuple(run for run in self.reached if (run.condition, run.variant) == (condition, variant))
 
     def require(self, condition: str, variants: Iterable[str]) -> None:
         """Check that every one of `variants` has a finished run in `condition`.
@@ -121,19 +155,25 @@ class Study:
 
     @functools.cached_property
     def results(self) -> pd.DataFrame:
-        """One row per finished run: what it reached, and what its training spent.
+        """One row per finished or published run: what it reached, and what its training spent.
 
         Columns: condition, variant, seed; training (final best so far), validation, test and full_reward (the
         champion's means over episodes); episodes, env_steps and wall_seconds of training. NaN for what a run lacks:
         baselines have test figures alone.
         """
-        rows = []
-        for run, manifest in self.finished.items():
-            result, spent = manifest.result, manifest.budget_spent
-            assert result is not None
-            test = result.champion
-            reached = (result.training, result.validation, test.fitness_mean, test.full_reward_mean)
-            rows.append((run.condition, run.variant, run.seed, *reached, *(spent.get(name) for name in _SPENT)))
+        rows: list[tuple[Any, ...]] = []
+        for run in self.reached:
+            place = (run.condition, run.variant, run.seed)
+            if run in self.published:
+                row = self.published[run]
+                reached = (row.training, row.validation, row.test_mean, row.full_reward_mean)
+                rows.append((*place, *reached, row.episodes, row.env_steps, row.wall_seconds))
+            else:
+                result, spent = self.finished[run].result, self.finished[run].budget_spent
+                assert result is not None
+                test = result.champion
+                reached = (result.training, result.validation, test.fitness_mean, test.full_reward_mean)
+                rows.append((*place, *reached, *(spent.get(name) for name in _SPENT)))
         table = pd.DataFrame(rows, columns=["condition", "variant", "seed", *_REACHED, *_SPENT])
         return table.astype(dict.fromkeys((*_REACHED, *_SPENT), float))
 
@@ -145,7 +185,7 @@ class Study:
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
         """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
-        validation = dict(zip(self.finished, self.results["validation"].fillna(-math.inf), strict=True))
+        validation = dict(zip(self.reached, self.results["validation"].fillna(-math.inf), strict=True))
         return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
 
     def best_seeds(self, condition: str, variant: str, among: Collection[Any]) -> list[int]:
@@ -153,8 +193,18 @@ class Study:
         return [run.seed for run in self.best_first(condition, variant) if run.seed in among][:BEST]
 
     def history(self, condition: str) -> pd.DataFrame:
-        """history.csv of all finished runs that learned, one under another, with columns ``variant`` and ``seed``."""
+        """history.csv of all runs that learned, one under another, with columns ``variant`` and ``seed``.
+
+        Published runs have nothing but ``generation`` and ``best_so_far``.
+        """
         tables = [
+            pd.DataFrame({"generation": range(1, row.generations + 1), "best_so_far": row.best_so_far}).assign(
+                variant=run.variant, seed=run.seed
+            )
+            for run, row in self.published.items()
+            if run.condition == condition and run.variant not in self.baselines
+        ]
+        tables += [
             read_csv(run.directory.history, HISTORY_COLUMNS).assign(variant=run.variant, seed=run.seed)
             for run in self.finished
             if run.condition == condition and run.variant not in self.baselines
@@ -163,11 +213,13 @@ class Study:
         return pd.concat(tables or [nothing], ignore_index=True)
 
     def robustness(self, condition: str) -> pd.DataFrame:
-        """The planned rows of robustness.csv of all finished runs, with columns ``variant`` and ``seed``.
+        """The planned rows of robustness.csv of all runs, with columns ``variant`` and ``seed``.
 
-        Rows that somebody tested besides, at other levels or with other numbers of episodes, are left out.
+        Published runs have no standard deviations. Rows that somebody tested besides, at other levels or with other
+        numbers of episodes, are left out.
         """
-        rows = [
+        nan = math.nan
+        rows: list[tuple[Any, ...]] = [
             (*row._replace(variant=run.variant), run.seed)
             for run in self.finished
             if run.condition == condition
@@ -175,6 +227,13 @@ class Study:
             if self.levels is None or row.level in self.levels.get(row.parameter, ())
             if self.sweep_episodes in (None, row.episodes)
         ]
+        for run, published in self.published.items():
+            if run.condition == condition and self.sweep_episodes in (None, published.sweep_episodes):
+                rows += [
+                    (run.variant, run.seed, sweep, level, published.sweep_episodes, fitness, nan, full, nan, run.seed)
+                    for sweep, level, fitness, full in published.levels
+                    if self.levels is None or level in self.levels.get(sweep, ())
+                ]
         return pd.DataFrame(rows, columns=[*RobustnessRow._fields, "seed"])
 
 

@@ -48,6 +48,8 @@ def _look(colour: str, marker: str, line: str | tuple[float, tuple[float, ...]] 
 _TRAINED = {
     "neat": _look(VERMILION, "s"),
     "exneat": _look(BLUE, "o"),
+    "neat_unconnected": _look(ORANGE, "D", "--"),
+    "exneat_unconnected": _look(SKY, "^", "--"),
     "single_unlinked": _look(SKY, "v"),
     "single_linked": _look(BLUE, "^"),
     "all_unlinked": _look(ORANGE, "D"),

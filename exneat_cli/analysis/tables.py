@@ -7,31 +7,27 @@ beside what was published; a comparison with the quantities side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
 from exneat_cli.analysis.statistics import compare, efficiency, mean
-from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence, number_range
+from exneat_cli.analysis.study import BEST, MissingRunsError, Study
 from exneat_cli.errors import check_choice
 from exneat_cli.records import make_directory, write_whole
 
-STATISTICS = ["mean", "low", "high", "iqm", "best_5"]
+STATISTICS = ["mean", "low", "high", "iqm", "best_5", "margin"]
 """Columns of a summary that are in the unit of their quantity."""
 _KEY = ["experiment", "condition", "variant", "quantity"]
 _SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
+_TESTED = ["runs", "margin", "p_holm", "a12"]
 LARGE = 10.0
 """Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
 _PLACE = ["condition", "variant", "quantity", "published"]
-_MEANINGS = {
-    "training": "final best so far",
-    "test": "the champion on test episodes",
-    "robustness": "the champion at one level of a sweep",
-    "full_reward": "on test episodes, with the rewards and costs that training leaves out",
-}
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
@@ -45,16 +41,17 @@ def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) 
     of = {column.of for column in plan.columns.values()}
     sentences: list[str] = []
     for experiment, own in lines.groupby("experiment", sort=False):
-        sentences += _sentences(studies[str(experiment)], own, of)
+        sentences += table_sentences(studies[str(experiment)], own, of)
     headings = {name: name for name in _PLACE} | {"mean": "ours (mean)", "interval": "95% interval", "iqm": "IQM"}
     if "robustness" in of:
         headings["best_5"] = f"ours, best {BEST}"
         mean_of_best = f"mean over the {BEST} runs that are best on validation, or all if there are fewer."
         sentences.append(f"Best {BEST}: {mean_of_best}")
-    headings |= {"runs": "runs", "p_holm": "p (Holm)", "a12": "A12"}
+    headings |= {"runs": "runs", "margin": "margin", "p_holm": "p (Holm)", "a12": "A12"}
     labelled = _labelled(lines, studies)
     means = lines["mean"].astype(object).where(lines["efficiency"] == "", lines["efficiency"])
-    exact = labelled.assign(mean=means)[[*_PLACE, *STATISTICS, "runs", "p_holm", "a12"]]
+    statistics = [name for name in STATISTICS if name not in _TESTED]
+    exact = labelled.assign(mean=means)[[*_PLACE, *statistics, *_TESTED]]
     cells = _printed(labelled)[list(headings)].rename(columns=headings)
     caption = " ".join(filter(None, [*sentences, plan.note]))
     return _write(directory, Built(plan.name, plan.title, caption, ()), exact, cells)
@@ -74,7 +71,11 @@ def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFram
     summaries = []
     for (experiment, condition), own in planned.groupby(["experiment", "condition"], sort=False):
         study = studies[str(experiment)]
-        study.require(str(condition), dict.fromkeys([study.first_variant, *own["variant"]]))
+        minuends = [column.minus for column in plan.columns.values() if column.minus]
+        variants = [each for variant in own["variant"] for each in (study.reference_of(variant), variant)]
+        for variant in minuends:
+            check_choice(f"{plan.name}: minus of {experiment}", variant, tuple(study.variants))
+        study.require(str(condition), dict.fromkeys([*variants, *minuends]))
         summaries.append(_summary(study, str(condition), plan.columns))
     lines = planned.merge(pd.concat(summaries), on=_KEY, how="left")
     swept = [name for name, column in plan.columns.items() if column.of == "robustness"]
@@ -95,7 +96,7 @@ def build_comparison(study: Study, directory: Path) -> Built:
         MissingRunsError: no run is finished at all.
         ExneatError: a file cannot be written.
     """
-    if not study.finished:
+    if not study.reached:
         what = f"{study.experiment}, budget {study.budget}: no finished run to compare"
         raise MissingRunsError(f"{what}\n  {study.command}")
     conditions = [name for name in study.conditions if (study.results["condition"] == name).any()]
@@ -103,46 +104,18 @@ def build_comparison(study: Study, directory: Path) -> Built:
     columns = {name: Column(of=name) for name in (*measured, "efficiency")}
     exact, shown = [("runs", "efficiency", "runs")], [("runs", "efficiency", "runs")]
     for name in measured:
-        exact += [(f"{name}_{each}", name, each) for each in STATISTICS if each != "best_5"]
+        exact += [(f"{name}_{each}", name, each) for each in ("mean", "low", "high", "iqm")]
         shown += [(name.replace("_", " "), name, "mean"), ("95% interval", name, "interval")]
-    exact += [("test_p_holm", "test", "p_holm"), ("test_a12", "test", "a12")]
+    exact += [(f"test_{each}", "test", each) for each in ("margin", "p_holm", "a12")]
     exact += [("efficiency", "efficiency", "efficiency")]
-    shown += [("test IQM", "test", "iqm"), ("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
+    shown += [("test IQM", "test", "iqm"), ("test margin", "test", "margin")]
+    shown += [("test p (Holm)", "test", "p_holm"), ("test A12", "test", "a12")]
     shown += [("efficiency", "efficiency", "mean")]
     lines = pd.concat([_summary(study, condition, columns) for condition in conditions], ignore_index=True)
     labelled = _labelled(lines, {study.experiment: study})
     name, title = f"comparison-{study.experiment}", f"All variants of {study.experiment}"
-    words = Built(name, title, " ".join(filter(None, _sentences(study, lines, columns))), ())
+    words = Built(name, title, " ".join(filter(None, table_sentences(study, lines, columns))), ())
     return _write(directory, words, _side_by_side(labelled, exact), _side_by_side(_printed(labelled), shown))
-
-
-def _sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
-    """What a table rests on and what its columns, some of `QUANTITIES`, mean.
-
-    `lines` are those of the study's summary that it shows, maybe with a column ``published``.
-    """
-    conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
-    is_published = "published" in lines and bool((lines["published"] != "").any())
-    first = study.variants[study.first_variant]
-    counts = {variant: [len(study.of(condition, variant)) for condition in conditions] for variant in variants}
-    # Labels of variants may hold commas.
-    listed = "; ".join(f"{study.variants[variant]} {number_range(runs)}" for variant, runs in counts.items())
-    yield f"Budget {study.budget}; finished runs per condition: {listed}."
-    if is_published and study.budget != "paper":
-        yield "The published figures rest on a larger budget."
-    if meanings := [f"{name.replace('_', ' ')}: {words}" for name, words in _MEANINGS.items() if name in quantities]:
-        yield f"{'; '.join(meanings).capitalize()}."
-    if study.fitness_name != "fitness":
-        yield f"Fitness is {study.fitness_name}."
-    yield "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean."
-    yield few_runs_sentence(lines.loc[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0), "runs"])
-    yield f"p: two-sided Mann-Whitney U test against {first}, Holm-corrected over the trained variants of a condition."
-    yield f"A12: chance that a run of the variant beats a run of {first}, a tie counting half."
-    if "efficiency" in quantities:
-        reached = "first generation, counted from 1, at which the mean best so far reaches the final mean of"
-        yield f"Efficiency: {reached} {first}."
-        yield "Published efficiencies are not exactly comparable." if is_published else ""
-    yield budget_sentence([study.spent_in(condition, variants) for condition in conditions])
 
 
 def _side_by_side(lines: pd.DataFrame, columns: Iterable[tuple[str, str, str]]) -> pd.DataFrame:
@@ -172,6 +145,7 @@ def _printed(lines: pd.DataFrame) -> pd.DataFrame:
         mean=np.where(lines["efficiency"] == "", cells("mean"), lines["efficiency"]),
         interval=[f"[{low}, {high}]" if low else "" for low, high in zip(cells("low"), cells("high"), strict=True)],
         iqm=cells("iqm"),
+        margin=cells("margin"),
         best_5=cells("best_5"),
         runs=lines["runs"].astype(str),
         p_holm=["<0.001" if p < 0.001 else rounded(p, 3) for p in lines["p_holm"]],
@@ -212,7 +186,8 @@ def _summary(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.
             part = pd.DataFrame({"runs": counts, "efficiency": _efficiencies(study, condition)})
         else:
             values = _values(study, condition, column)
-            part = compare({variant: list(runs.values()) for variant, runs in values.items()}, study.baselines)
+            of_runs = {variant: list(runs.values()) for variant, runs in values.items()}
+            part = compare(of_runs, study.baselines, study.references)
             part["efficiency"] = ""
             if column.of == "robustness":
                 best = [(study.best_seeds(condition, variant, runs), runs) for variant, runs in values.items()]
@@ -231,18 +206,21 @@ def _values(study: Study, condition: str, column: Column) -> dict[str, dict[int,
         is_level = np.isclose(rows["level"].astype(float), float(column.level or 0.0))
         rows = rows[is_level & (rows["parameter"] == column.sweep)]
     rows = rows.dropna(subset=name)
+    if column.minus is not None:
+        rows = rows.assign(**{name: rows[name] - rows.loc[rows["variant"] == column.minus, name].mean()})
     return {v: dict(rows.loc[rows["variant"] == v, ["seed", name]].itertuples(index=False)) for v in study.variants}
 
 
 def _efficiencies(study: Study, condition: str) -> dict[str, str]:
-    """The generation at which each variant's mean curve reaches the final mean of the study's first variant.
+    """The generation at which each variant's mean curve reaches the final mean of its reference.
 
-    E.g. ``7``, ``>20`` if 20 were not enough, or nothing if the variant or the first one has no curve.
+    E.g. ``7``, ``>20`` if 20 were not enough, or nothing if the variant or its reference has no curve.
     """
     best = study.history(condition).groupby(["variant", "generation"])["best_so_far"].mean()
     curves = {str(variant): curve.to_numpy() for variant, curve in best.groupby("variant")}
     found = dict.fromkeys(study.variants, "")
-    if study.first_variant in curves:
-        target = float(curves[study.first_variant][-1])
-        found |= {v: str(efficiency(curve, target) or f">{len(curve)}") for v, curve in curves.items()}
+    for variant, curve in curves.items():
+        reference = curves.get(study.reference_of(variant))
+        if reference is not None:
+            found[variant] = str(efficiency(curve, float(reference[-1])) or f">{len(curve)}")
     return found

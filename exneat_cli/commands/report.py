@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,9 @@ from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
 from exneat_cli.commands.jobs import BUDGETS
-from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment
+from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ExneatError, check_choice, check_path
-from exneat_cli.records import RunDirectory
+from exneat_cli.records import PublishedRun, RunDirectory, read_published
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis")
@@ -38,14 +38,17 @@ def run(line: CommandLine) -> int:
     names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})
     sources = {name: asked["experiment"] if own and own.name == name else name for name in names}
     experiments = {name: read_experiment(source) for name, source in sources.items()}
-    budgets = {name: asked["budget"] or _largest_budget(experiments[name], asked["output"]) for name in names}
+    rows = {name: read_published(results_file(sources[name])) for name in names}
+    budgets = {
+        name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
+    }
     commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
     lacking = ExneatError(f"output={asked['output']}: no finished run of {', '.join(names)}\n  {commands[names[0]]}")
-    if not any(_has_finished(experiments[name], budgets[name], asked["output"]) for name in names):
+    if not any(_has_any(experiments[name], budgets[name], asked["output"], rows[name]) for name in names):
         plan_jobs(experiments[names[0]], budgets[names[0]], line, _OWN)  # refuses settings that make no sense
         raise lacking  # planning all of them takes ten seconds
-    studies = {name: _study(experiments[name], budgets[name], commands[name], line) for name in names}
-    if not any(study.finished for study in studies.values()):
+    studies = {name: study_of(experiments[name], budgets[name], commands[name], line, rows[name]) for name in names}
+    if not any(study.reached for study in studies.values()):
         raise lacking
     directory = Path(asked["output"]) / "report" / (own.name if own else "")
     built: list[Built] = []
@@ -64,7 +67,7 @@ def run(line: CommandLine) -> int:
         else:
             print("\n".join(map(str, built[-1].paths)), flush=True)
     if asked["only"] is None:
-        built += [build_comparison(study, directory) for study in studies.values() if study.finished]
+        built += [build_comparison(study, directory) for study in studies.values() if study.reached]
         page = write_index(directory, studies, built, missing)
         print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs\n{page}")
     return 0
@@ -105,14 +108,17 @@ def _command(source: str, budget: str, asked: Mapping[str, Any], line: CommandLi
     return shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *places, *others])
 
 
-def _study(experiment: Experiment, budget: str, command: str, line: CommandLine) -> Study:
-    """The runs of an experiment."""
+def study_of(
+    experiment: Experiment, budget: str, command: str, line: CommandLine, rows: Sequence[PublishedRun]
+) -> Study:
+    """The runs of an experiment, of which `rows` are published."""
     jobs = plan_jobs(experiment, budget, line, _OWN)
     task = jobs[0].settings.task
     runs = {}
     for job in jobs:
         (condition, variant, _), settings = job.name.split("/"), job.settings
-        runs[PlannedRun(condition, variant, settings.seed, settings.directory, settings.trained_generations)] = job
+        length, identity = settings.trained_generations, settings.full_hash
+        runs[PlannedRun(condition, variant, settings.seed, settings.directory, length, identity)] = job
     swept = [job for job in jobs if job.sweeps]
     sweeps = {sweep.name: sweep for job in swept for sweep in job.sweeps}
     return Study(
@@ -127,18 +133,25 @@ def _study(experiment: Experiment, budget: str, command: str, line: CommandLine)
         conditions={name: condition.label for name, condition in experiment.conditions.items()},
         sweeps={name: sweep.label for name, sweep in sweeps.items()},
         runs=tuple(runs),
+        references={name: variant.against for name, variant in experiment.variants.items() if variant.against},
         levels={name: sweep.levels for name, sweep in sweeps.items()},
         sweep_episodes=swept[0].episodes if swept else None,
+        rows=tuple(rows),
     )
 
 
-def _largest_budget(experiment: Experiment, output: str) -> str:
-    finished = (budget for budget in BUDGETS if _has_finished(experiment, budget, output))
-    planned = (budget for budget in ("quick", *BUDGETS) if budget in experiment.runs)
-    return next(finished, None) or next(planned)
+def _largest_budget(experiment: Experiment, output: str, rows: Sequence[PublishedRun]) -> str:
+    """The largest budget of which a run is finished here, else published, else the one to begin with."""
+    finished = [budget for budget in BUDGETS if _has_any(experiment, budget, output, ())]
+    published = [budget for budget in BUDGETS if _has_any(experiment, budget, output, rows)]
+    planned = [budget for budget in ("quick", *BUDGETS) if budget in experiment.runs]
+    return [*finished, *published, *planned][0]
 
 
-def _has_finished(experiment: Experiment, budget: str, output: str) -> bool:
+def _has_any(experiment: Experiment, budget: str, output: str, rows: Sequence[PublishedRun]) -> bool:
+    """Whether a run of that budget is finished or published."""
+    if any(row.budget == budget for row in rows):
+        return True
     folders = [Path(output) / f"{experiment.name}-{condition}-{budget}" for condition in experiment.conditions]
     manifests = (path for folder in folders for path in folder.glob("*/manifest.json"))
     return any(RunDirectory(path.parent).is_finished() for path in manifests)

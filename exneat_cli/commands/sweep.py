@@ -19,6 +19,7 @@ from omegaconf.errors import OmegaConfBaseException
 from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
 from exneat_cli.commands.jobs import BUDGETS, Job, read_job
 from exneat_cli.commands.launching import run_jobs
+from exneat_cli.commands.publishing import Publisher
 from exneat_cli.errors import (
     ConfigError,
     ExneatError,
@@ -42,12 +43,16 @@ _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "h
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the things compared; without `runs` it has as many seeds as the experiment says."""
+    """One of the things compared, with the first variant or with `against`.
+
+    Without `runs` it has as many seeds as the experiment says.
+    """
 
     label: str
     settings: Mapping[str, Any]
     runs: int | None = None
     swept: bool = True
+    against: str | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,13 @@ class Experiment:
 def experiment_names() -> list[str]:
     """Names of the experiments that come with exneat."""
     return sorted(path.stem for path in shipped_directory("experiments").glob("*.yaml") if path.stem != "catalogue")
+
+
+def results_file(name: str) -> Path:
+    """Where the published rows of an experiment are: ``results/<name>.csv`` beside its YAML file."""
+    own = name.endswith((".yaml", ".yml"))
+    path = Path(name) if own else shipped_directory("experiments") / f"{name}.yaml"
+    return path.parent / "results" / f"{path.stem}.csv"
 
 
 def read_experiment(name: object) -> Experiment:
@@ -119,7 +131,7 @@ def _experiment(name: str, content: Any) -> Experiment:
     return replace(
         experiment,
         settings=_settings("settings", experiment.settings),
-        variants={key: _variant(f"variants.{key}", entry) for key, entry in content["variants"].items()},
+        variants={key: _variant(f"variants.{key}", entry, content) for key, entry in content["variants"].items()},
         conditions={key: _condition(f"conditions.{key}", entry) for key, entry in content["conditions"].items()},
     )
 
@@ -135,10 +147,13 @@ def _check_labels(part: str, entries: Mapping[str, Any]) -> None:
         labels[label] = name
 
 
-def _variant(key: str, entry: Any) -> Variant:
+def _variant(key: str, entry: Any, content: Any) -> Variant:
     variant = build(Variant, entry, f"{key}.")
     check_text(f"{key}.label", variant.label)
     check_flag(f"{key}.swept", variant.swept)
+    if variant.against is not None:
+        others = [name for name in content["variants"] if f"variants.{name}" != key]
+        check_choice(f"{key}.against", variant.against, others)
     if variant.runs is not None:
         check_whole(f"{key}.runs", variant.runs, 1, 10_000)
     return replace(variant, settings=_settings(f"{key}.settings", variant.settings))
@@ -211,11 +226,17 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: the experiment or a setting makes no sense; nothing was run then.
     """
-    asked = line.compose("experiment", "budget")
+    asked = line.compose("experiment", "budget", "publish")
     if not asked["experiment"]:
         raise ConfigError("experiment", "a name or a YAML file, e.g. experiment=track_maze", asked["experiment"])
+    check_flag("publish", asked["publish"])
     experiment = read_experiment(asked["experiment"])
-    jobs = plan_jobs(experiment, asked["budget"], line, ("experiment",))
+    jobs = plan_jobs(experiment, asked["budget"], line, ("experiment", "publish"))
+    publisher = None
+    if asked["publish"]:
+        file, names = results_file(asked["experiment"]), (tuple(experiment.conditions), tuple(experiment.variants))
+        publisher = Publisher(file, asked["budget"], *names)
+        publisher.publish([job for job in jobs if job.is_finished()])
     pending = [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
     for job in pending:
         check_worlds(job.settings.task)
@@ -225,7 +246,7 @@ def run(line: CommandLine) -> int:
     reasons = [""] * len(pending)
     try:
         if pending:
-            reasons = run_jobs(functools.partial(_do, jobs, len(pending), time.time(), line), pending, line)
+            reasons = run_jobs(functools.partial(_do, jobs, len(pending), time.time(), line, publisher), pending, line)
     except ExneatError as error:
         if signal_heard() is not None or not any(job.is_finished() for job in pending):
             raise
@@ -242,11 +263,15 @@ def run(line: CommandLine) -> int:
     return 1 if failed else 0
 
 
-def _do(jobs: Sequence[Job], pending: int, began: float, line: CommandLine, job: Job) -> None:
-    """Do one job, and tell how far the sweep is."""
+def _do(
+    jobs: Sequence[Job], pending: int, began: float, line: CommandLine, publisher: Publisher | None, job: Job
+) -> None:
+    """Do one job, publish it if that is asked for, and tell how far the sweep is."""
     started = time.time()
     shown = sys.stderr.isatty() and not line.launcher
     finished = job.do(progress_for_terminal() if shown else Progress(), line.words, go_on=True)
+    if publisher:
+        publisher.publish([job])
     left = sum(not each.is_finished() for each in jobs)
     seconds = (time.time() - began) / max(1, pending - left) * left
     when = f"about {seconds / 60:.0f} min" if seconds >= 90 else f"about {seconds:.0f} s"

@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 
 from exneat_cli.records.plain import Count, Real, Word
 
-MANIFEST_FORMAT = 3
+MANIFEST_FORMAT = 4
 RUNNING: Final = "running"
 DONE: Final = "done"
 FAILED: Final = "failed"

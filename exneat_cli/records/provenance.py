@@ -45,10 +45,17 @@ def git_commit() -> str | None:
     root = Path(exneat_cli.__file__).parents[1]
     if not (root / ".git").exists():
         return None
-    command = ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
-    # GIT_DIR and its like, which git sets for hooks, would name another repository than that directory's.
-    own = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True, env=own).stdout.strip()
+        commit = _git(root, "rev-parse", "HEAD")
+        # Published rows and pages change while runs are made, and no run depends on them.
+        changed = _git(root, "diff", "--name-only", "HEAD", "--", ".", ":!experiments/results", ":!docs")
     except (OSError, subprocess.SubprocessError):
         return None
+    return f"{commit}-dirty" if changed else commit
+
+
+def _git(root: Path, *arguments: str) -> str:
+    command = ["git", "-C", str(root), *arguments]
+    # GIT_DIR and its like, which git sets for hooks, would name another repository than that directory's.
+    own = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True, env=own).stdout.strip()

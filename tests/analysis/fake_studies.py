@@ -40,6 +40,7 @@ def plan_study(
     seeds: int = 3,
     experiment: str = "track",
     has_full_reward: bool = False,
+    references: Mapping[str, str] | None = None,
 ) -> Study:
     """A study none of whose runs is finished."""
     runs = tuple(
@@ -60,6 +61,7 @@ def plan_study(
         conditions=conditions,
         sweeps=SWEEPS,
         runs=runs,
+        references=references or {},
     )
 
 

@@ -19,6 +19,7 @@ from exneat_cli.analysis.statistics import (
     efficiency,
     holm,
     interquartile_mean,
+    least_p,
     mann_whitney_p,
     mean,
 )
@@ -106,6 +107,20 @@ def test_every_variant_is_compared_with_the_first_and_those_that_learn_are_corre
     np.testing.assert_allclose(found["a12"], [math.nan, 6 / 9, 1.0, 0.0])
     assert list(found["runs"]) == [3, 3, 3, 1]
     assert found.loc["all", ["mean", "iqm"]].tolist() == pytest.approx([0.8, 0.8])
+
+
+def test_those_that_others_are_compared_with_are_not_compared_themselves() -> None:
+    low, middle, high = [0.1, 0.2, 0.3], [0.15, 0.25, 0.35], [0.7, 0.8, 0.9]
+    found = compare({"a": low, "b": high, "c": middle, "d": high}, references={"d": "c"})
+    assert found[["margin", "p_holm", "a12"]].isna().all(axis=1).tolist() == [True, False, True, False]
+    np.testing.assert_allclose(found.loc[["b", "d"], "margin"], [0.6, 0.55])
+    np.testing.assert_allclose(found.loc[["b", "d"], "p_holm"], 2 * 0.1)
+
+
+@pytest.mark.parametrize(("one", "other"), [(1, 1), (1, 3), (3, 3), (4, 5)])
+def test_the_least_p_is_that_of_samples_far_apart(one: int, other: int) -> None:
+    low, high = [float(k) for k in range(one)], [100.0 + k for k in range(other)]
+    assert least_p(one, other) == pytest.approx(mann_whitney_p(low, high))
 
 
 def test_variants_without_runs_can_be_compared() -> None:

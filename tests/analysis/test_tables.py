@@ -46,11 +46,11 @@ def test_each_line_holds_what_was_published_and_what_runs_gave(tmp_path: Path) -
     assert [row[1:3] for row in table.rows] == [(variant, q) for variant in ("NEAT", "ExNEAT") for q in PLAIN]
     neat, _, neat_efficiency, exneat, exneat_test, exneat_efficiency = table.rows
     assert neat[:5] == ("no noise", "NEAT", "training", "0.7869", "0.300")
-    assert neat[6:] == ("0.300", "3", "", "")
-    assert exneat[3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.100", "1.00")
+    assert neat[6:] == ("0.300", "3", "", "", "")
+    assert exneat[3:] == ("1.0", "0.800", "[0.700, 0.900]", "0.800", "3", "0.500", "0.100", "1.00")
     assert exneat_test[3:5] == ("", "0.400")
-    assert neat_efficiency[3:] == (">20", "2", "", "", "3", "", "")
-    assert exneat_efficiency[3:] == ("7", "1", "", "", "3", "", "")
+    assert neat_efficiency[3:] == (">20", "2", "", "", "3", "", "", "")
+    assert exneat_efficiency[3:] == ("7", "1", "", "", "3", "", "", "")
 
 
 def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_path: Path) -> None:
@@ -60,6 +60,38 @@ def test_a_baseline_can_be_a_row_without_weakening_the_tests_of_the_others(tmp_p
     assert table.loc[("random actions", "test"), "mean"] == "0.45"
     assert table.loc[("random actions", "test"), ["low", "p_holm"]].isna().all()
     assert table.loc[("random actions", "efficiency"), ["mean", "published"]].isna().all()
+
+
+def test_variants_can_have_references_of_their_own(tmp_path: Path) -> None:
+    variants = {"neat": "NEAT", "exneat": "ExNEAT", "neat_2": "NEAT 2", "exneat_2": "ExNEAT 2"}
+    study = finish_all(plan_study(tmp_path, variants=variants, baselines=(), references={"exneat_2": "neat_2"}))
+    rows = [TableRow("track", condition, variant) for condition in study.conditions for variant in variants]
+    table = built(study, tmp_path, PLAIN, *rows)
+    lines = csv_of(table, "condition", "variant", "quantity").loc["no noise"]
+    assert lines.loc[("ExNEAT", "test"), "margin"] == pytest.approx(0.1)
+    assert lines.loc[("ExNEAT 2", "test"), "margin"] == pytest.approx(0.1)
+    assert lines.loc[("ExNEAT 2", "efficiency"), "mean"] == lines.loc[("ExNEAT", "efficiency"), "mean"] == "3"
+    assert lines.loc[("NEAT 2", "test"), ["margin", "p_holm", "a12"]].isna().all()
+    assert "compared with NEAT, ExNEAT 2 with NEAT 2: margin" in table.caption
+    assert "training ExNEAT +0.100 over NEAT; ExNEAT 2 +0.100 over NEAT 2, test ExNEAT +0.100" in table.caption
+
+
+def test_what_a_baseline_reaches_can_be_taken_away(tmp_path: Path) -> None:
+    study = finish_all(plan_study(tmp_path))
+    over = {"test": Column(of="test"), "over": Column(of="test", minus="random")}
+    table = lines_of(study, tmp_path, over)
+    for column in ("mean", "low", "high"):
+        test, above = (float(table.loc[("ExNEAT", quantity), column]) for quantity in over)
+        assert test - above == pytest.approx(0.45)
+    assert table.loc[("ExNEAT", "over"), "p_holm"] == table.loc[("ExNEAT", "test"), "p_holm"]
+    with pytest.raises(ExneatError, match="minus of track: expected one of"):
+        lines_of(study, tmp_path, {"over": Column(of="test", minus="wind")})
+
+
+@pytest.mark.parametrize(("seeds", "said"), [(3, True), (4, False)])
+def test_too_few_runs_for_any_p_are_named(tmp_path: Path, seeds: int, said: bool) -> None:
+    table = built(finish_all(plan_study(tmp_path, seeds=seeds)), tmp_path, PLAIN)
+    assert ("3 runs against 3 cannot reach a p below 0.1, whatever they give." in table.caption) == said
 
 
 def test_efficiency_is_when_the_mean_of_runs_reaches_that_of_the_first_variant_if_ever(tmp_path: Path) -> None:
@@ -152,12 +184,15 @@ def test_a_bar_in_a_label_does_not_break_the_markdown(tmp_path: Path) -> None:
 
 def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(tmp_path: Path) -> None:
     plans = [each for each in read_catalogue(CATALOGUE).values() if isinstance(each, TablePlan)]
-    assert len(plans) == 5
+    assert len(plans) == 6
     levels = {(sweep, 0.2): (700.0, 1600.0) for sweep in ("reset_noise", "sensor_noise")}
     for each in plans:
         names = {row.variant: row.variant for row in each.rows}, {row.condition: row.condition for row in each.rows}
         directory, experiment = tmp_path / each.name, each.rows[0].experiment
-        planned = plan_study(directory, variants=names[0], baselines=(), conditions=names[1], experiment=experiment)
+        variants, baselines = names[0] | {"linear_fusion": "linear fusion"}, ("linear_fusion",)
+        planned = plan_study(
+            directory, variants=variants, baselines=baselines, conditions=names[1], experiment=experiment
+        )
         table = build_table(each, {experiment: finish_all(planned, levels)}, tmp_path / "report")
         published = [str(figure) for row in each.rows for figure in row.published.values()]
         assert sorted(row[3] for row in table.rows if row[3]) == sorted(published)

@@ -163,7 +163,7 @@ class PlainHunting:
         return 1 - len(self.free) / self.n_prey
 
     def _advance(self, rng: Generator) -> None:
-        self.signals *= 1 - self.p_c
+        self.signals *= self.p_c
         free = []
         for prey in self.free:
             if self._is_caught(prey):

@@ -70,7 +70,7 @@ CHAMPIONS = {
 """How a champion is spoilt, and what evaluate and inspect must name."""
 
 OTHERS = {
-    "old": (manifest_with(format=2), "manifest.json: expected format 3, got 2"),
+    "old": (manifest_with(format=2), "manifest.json: expected format 4, got 2"),
     "unfinished": (manifest_with(status="failed"), "expected a finished run, got status 'failed'"),
     "running": (manifest_with(status="running"), "expected a finished run, got status 'running'"),
     "hash": (manifest_with(configuration_hash="0"), "config.yaml: does not describe the run beside it"),

@@ -19,12 +19,13 @@ IDS = [
     *(f"figure-5.{k}" for k in range(1, 8)),
     *(f"figure-7.{k}" for k in range(1, 10)),
     *(f"table-5.{k}" for k in range(1, 6)),
+    *("figure-walking", "table-walking"),
 ]
 
 
 @pytest.fixture(scope="module")
 def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All five experiments at smoke size."""
+    """All experiments at smoke size."""
     output = tmp_path_factory.mktemp("smoke") / "outputs"
     with pytest.MonkeyPatch.context() as patch:  # the figures of single runs are not looked at here, and slow
         patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
@@ -41,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_the_catalogue_has_every_figure_and_table_of_the_thesis() -> None:
+def test_the_catalogue_has_every_figure_and_table_of_the_thesis_and_ours() -> None:
     assert sorted(CATALOGUE) == sorted(IDS)
 
 

@@ -214,6 +214,7 @@ NONSENSE = [
     ({"variants": {"neat": "NEAT"}}, "variants.neat: expected a section"),
     (variant(settings=[1]), "variants.neat.settings: expected a section"),
     (variant(label=[1]), "variants.neat.label: expected text, got [1]"),
+    (variant(against="neta"), "variants.neat.against: expected one of"),
     (variant(swept="no"), "variants.neat.swept: expected true or false, got 'no'"),
     (variant(setings={}), "did you mean variants.neat.settings?"),
     ({"variants": {"a/b": {"label": "NEAT", "settings": {}}}}, "name: expected at most 40 letters"),

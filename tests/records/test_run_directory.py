@@ -106,7 +106,7 @@ def test_a_run_may_be_made_longer_by_resume_and_never_shorter(tmp_path: Path, st
 @pytest.mark.parametrize(
     ("entries", "named"),
     [
-        ({"format": 2}, "expected format 3, got 2: another version of exneat wrote it"),
+        ({"format": 2}, "expected format 4, got 2: another version of exneat wrote it"),
         ({"status": "\x1b[31mdone"}, "damaged: status: invalid enum value"),
         ({"wurst": 1}, "damaged: object contains unknown field wurst"),
         ({"result": {"champion": {}}}, "damaged: result.champion: object missing required field episodes"),

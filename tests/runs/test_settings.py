@@ -11,7 +11,7 @@ from exneat_cli.algorithms import ARS, EvolutionSettings
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Noise
 from exneat_cli.runs import RunSettings
-from exneat_cli.tasks import AntTask
+from exneat_cli.tasks import AntTask, GeneralMaze, Hunting, Task, TrackMaze
 from exneat_cli.wiring import Geometry, Wiring
 
 
@@ -104,3 +104,19 @@ def test_an_unknown_key_is_refused_with_the_closest_known_one() -> None:
     plain = RunSettings().to_plain()
     with pytest.raises(ExneatError, match=r"evolution\.elitsm: unknown key .*\n.*did you mean evolution\.elitism"):
         RunSettings.from_plain({**plain, "evolution": {**plain["evolution"], "elitsm": 1}})
+
+
+@pytest.mark.parametrize(
+    ("before", "changed", "recorded"),
+    [
+        (TrackMaze(), TrackMaze(leading="second"), "a25d1e"),
+        (GeneralMaze(), GeneralMaze(channel_weights=(0.2, 0.8)), "aa743e"),
+        (Hunting(), Hunting(rules="library"), None),
+    ],
+)
+def test_later_parameters_of_grid_worlds_are_hashed_only_where_they_change_something(
+    before: Task, changed: Task, recorded: str | None
+) -> None:
+    old, new = (RunSettings(task=task).directory.path.name[-6:] for task in (before, changed))
+    assert recorded in (None, old)
+    assert new != old

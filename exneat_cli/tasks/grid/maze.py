@@ -39,6 +39,8 @@ class Maze(NamedTuple):
     time_share: float  #: weight of time in the fitness; progress has the rest
     cue_noise: float  #: sd of the noise on the cues of path tiles
     gap: int  #: silent tiles before the goal of a track
+    second_leads: bool  #: the second channel leads along every track, else one that is drawn
+    weights: tuple[float, float]  #: of the cues on both channels of a general maze
     cues_removed: float  #: share of the path tiles of a general maze
     walls_removed: float  #: share of the walls between its cells
 

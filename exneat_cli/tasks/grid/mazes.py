@@ -2,12 +2,13 @@
 
 The track is one corridor. The agent starts in the middle; the goal is at the left or right end with equal chance. One
 channel, drawn per maze, leads: it rises from 0.1 beside the start to 0.5 at the goal, on the goal's side alone. The
-other misleads with the same ramp on both sides.
+other misleads with the same ramp on both sides. In the thesis' text it is always the second that leads
+(``leading=second``).
 
 The corridors of the general maze, drawn anew for each episode, are a spanning tree over the cells on odd rows and
-columns; start and goal are two of the maze's corners. On both channels the cue of a tile is
-``(d_max - d) / d_max / 2``, d its walking distance to the goal and d_max the largest one: from 0 at the furthest tile
-to 0.5 at the goal.
+columns; start and goal are two of the maze's corners. On either channel the cue of a tile is
+``(d_max - d) / d_max`` times the channel's weight, d its walking distance to the goal and d_max the largest one: from 0
+at the furthest tile to the weight, 0.5, at the goal.
 
 Observation and action, index by index: `exneat_cli.tasks.grid.world`. Scoring: `exneat_cli.tasks.grid.maze`.
 Source: Zhang (2025), section 3.2.1.
@@ -33,6 +34,7 @@ LEAST_CUE, MOST_CUE = 0.1, 0.5
 """Ends of the ramp, from the tile beside the start to the goal."""
 
 
+LEADING = ("random", "second")
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
 """What `task.fitness` may be -> weight of time in the fitness; progress has the rest."""
 
@@ -44,9 +46,12 @@ class MazeTask(GridTask):
     cue_noise: float
     fitness: str
     gap: int = 0
+    leading: str = "random"
     cues_removed: float = 0.0
     walls_removed: float = 0.0
+    channel_weights: tuple[float, float] = (0.5, 0.5)
 
+    came_later: ClassVar[dict[str, Any]] = {"leading": "random", "channel_weights": (0.5, 0.5)}
     terms: ClassVar[tuple[str, ...]] = ("time_reward", "progress_reward")
     trace_columns: ClassVar[tuple[str, ...]] = ("row", "column", "goal_row", "goal_column")
     """Row and column of the agent, then of the goal."""
@@ -70,6 +75,13 @@ class MazeTask(GridTask):
         check_whole("task.gap", self.gap, 0, (self.size - 3) // 2)
         check_real("task.cues_removed", self.cues_removed, 0.0, 1.0)
         check_real("task.walls_removed", self.walls_removed, 0.0, 1.0)
+        check_choice("task.leading", self.leading, LEADING)
+        weights = self.channel_weights
+        if not isinstance(weights, list | tuple) or len(weights) != CHANNELS:
+            raise ConfigError("task.channel_weights", "two numbers, e.g. [0.5, 0.5]", weights)
+        for weight in weights:
+            check_real("task.channel_weights", weight, 0.0, 1.0)
+        object.__setattr__(self, "channel_weights", tuple(map(float, weights)))
 
     def _open(self, reset: Callable[..., Any]) -> Simulation:
         tiles = (self.size, self.size)
@@ -83,6 +95,8 @@ class MazeTask(GridTask):
             # A whole number would be another type to the compiler, and compiled apart.
             cue_noise=float(self.cue_noise),
             gap=self.gap,
+            second_leads=self.leading == "second",
+            weights=self.channel_weights,
             cues_removed=float(self.cues_removed),
             walls_removed=float(self.walls_removed),
         )
@@ -97,6 +111,7 @@ class TrackMaze(MazeTask):
         name: always ``track_maze``.
         size: tiles per side, odd, 5 to 99; the track is size - 2 tiles long.
         gap: tiles before the goal on which both channels are silent, 0 to (size - 3) / 2.
+        leading: which channel leads: ``random``, drawn for each track, or ``second``.
         cue_noise: sd of normal noise on the cues of path tiles; cues stay at least 0.
         fitness: ``time_and_progress``, or ``time`` alone.
 
@@ -107,6 +122,7 @@ class TrackMaze(MazeTask):
     name: str = "track_maze"
     size: int = 13
     gap: int = 0
+    leading: str = "random"
     cue_noise: float = 0.0
     fitness: str = "time_and_progress"
 
@@ -125,6 +141,7 @@ class GeneralMaze(MazeTask):
         cue_noise: sd of normal noise on the cues of path tiles; cues stay at least 0.
         cues_removed: share of path tiles without cues, 0 to 1.
         walls_removed: share of walls between cells that are opened, 0 to 1.
+        channel_weights: of the cues on both channels, each 0 to 1.
         fitness: ``time_and_progress``, or ``time`` alone.
 
     Raises:
@@ -136,6 +153,7 @@ class GeneralMaze(MazeTask):
     cue_noise: float = 0.0
     cues_removed: float = 0.0
     walls_removed: float = 0.0
+    channel_weights: tuple[float, float] = (0.5, 0.5)
     fitness: str = "time_and_progress"
 
     def open(self, *, training: bool) -> Simulation:
@@ -153,7 +171,7 @@ def draw_track(maze: Maze, rng: Generator) -> None:
     maze.path[:] = 0
     maze.path[middle, 1 : size - 1] = 1
     side = 1 if rng.random() < 0.5 else -1
-    leading = 0 if rng.random() < 0.5 else 1
+    leading = 0 if rng.random() < 0.5 and not maze.second_leads else 1
     # The k-th tile from the start: the leading channel speaks on the goal's side, the other one on both.
     maze.signals[:] = 0.0
     for k in range(1, reach + 1):
@@ -184,7 +202,9 @@ def draw_maze(maze: Maze, rng: Generator) -> None:
     for row in range(size):
         for column in range(size):
             if maze.path[row, column] == 1:
-                maze.signals[:, row, column] = (furthest - maze.distances[row, column]) / furthest / 2.0
+                nearness = (furthest - maze.distances[row, column]) / furthest
+                for channel in range(CHANNELS):
+                    maze.signals[channel, row, column] = nearness * maze.weights[channel]
     # Tiles that lost their cue get noise as all others do.
     silent = draw_tiles(maze.path, int(np.rint(maze.cues_removed * maze.path.sum())), rng)
     for k in range(silent.shape[0]):

@@ -3,23 +3,27 @@
 The agent starts in the centre of an open square with a wall around. Prey emit odour (channel 1) and sound
 (channel 2) in Gaussian patches; in foraging each emits one of them, alternating by index, in hunting both.
 
-Each step begins with the world: the cue field decays; each free prey on the agent's tile is caught; each
-other one may move, is caught if it enters the agent's tile, and adds a patch of cue around itself, or the
-same patch with its values shuffled, which carries no direction. Then the agent senses and moves; stepping
+Each step begins with the world: a share `p_c` of the cue field persists; each free prey on the agent's tile is
+caught; each other one may move, is caught if it enters the agent's tile, and adds a patch of cue around itself, or
+the same patch with its values shuffled, which carries no direction. Then the agent senses and moves; stepping
 onto a prey catches it. The episode ends when all are caught, or after `steps` moves. Its fitness, paid at the
 last step, is the share of prey caught.
+
+With ``rules=library`` prey are caught at the beginning of a step alone, before they move, so that one that walks onto
+the agent is not, nor one that the last move leads to; and prey may start on the agent's tile.
 
 The reset has drawn all paths and cues (`exneat_cli.tasks.grid.prey_field`), so a step only looks up four tiles;
 a caught prey's cues are taken from the moment before, and fade.
 
 Observation and action, index by index: `exneat_cli.tasks.grid.world`.
-Source: Zhang (2025), section 3.2.2, with p_c as the decay of cues.
+Source: Zhang (2025), section 3.2.2, and the library behind it, Multimodal_mazes by M. Ghosh (``rules=library``, and p_c
+as what persists, where the thesis calls it a decay).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -32,6 +36,7 @@ from exneat_cli.tasks.grid.world import CHANNELS, COLUMN, COLUMN_STEPS, ROW, ROW
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 
 MOTIONS = ("levy", "brownian")
+RULES = ("own", "library")
 MOST_CUES = 2**25
 """Numbers that one world may hold, 256 MiB."""
 
@@ -46,20 +51,22 @@ class Foraging(GridTask):
         n_prey: at most size * size - 1.
         steps: moves of the agent, at least 1; what every prey emits is kept for all of them, 256 MiB at most.
         p_e: chance per prey, step and channel that the cue has a direction, 0 to 1.
-        p_c: decay of the cues per step, 0 (they stay) to 1 (they vanish at once).
+        p_c: persistence, the share of the cues that is left after a step, 0 (they vanish at once) to 1 (they stay).
         patch_width: tiles per side of an emission, odd, 1 to 15.
+        rules: ``own`` or ``library``, when prey are caught and where they start.
 
     Raises:
         ConfigError: a value is out of range.
     """
 
     name: str = "foraging"
-    size: int = 10
+    size: int = 7
     n_prey: int = 10
     steps: int = 50
-    p_e: float = 0.8
-    p_c: float = 0.5
+    p_e: float = 1.0
+    p_c: float = 0.0
     patch_width: int = 5
+    rules: str = "own"
 
     terms: ClassVar[tuple[str, ...]] = ("caught",)
     channels: ClassVar[int] = 1
@@ -67,6 +74,7 @@ class Foraging(GridTask):
     p_m = 0.0
     motion = "brownian"
     """Prey never move here; no settings, see `Hunting`."""
+    came_later: ClassVar[dict[str, Any]] = {"rules": "own"}
 
     def __post_init__(self) -> None:
         check_choice("task.name", self.name, [type(self).name])
@@ -76,6 +84,7 @@ class Foraging(GridTask):
         check_real("task.p_e", self.p_e, 0.0, 1.0)
         check_real("task.p_c", self.p_c, 0.0, 1.0)
         check_whole("task.patch_width", self.patch_width, 1, 15)
+        check_choice("task.rules", self.rules, RULES)
         if self.patch_width % 2 == 0:
             raise ConfigError("task.patch_width", "an odd number", self.patch_width, "a patch has a tile in its centre")
         per_prey = (self.size + 2) ** 2 * self.channels
@@ -112,9 +121,10 @@ class Foraging(GridTask):
             patch=bell(self.patch_width),
             channels=self.channels,
             emission=float(self.p_e),
-            keep=1.0 - self.p_c,
+            keep=float(self.p_c),
             motion=float(self.p_m),
             levy=self.motion == "levy",
+            library=self.rules == "library",
         )
         return Simulation(field, reset, rewind, observe, step, locate)
 
@@ -145,6 +155,7 @@ class Hunting(Foraging):
     """
 
     name: str = "hunting"
+    p_e: float = 0.8
     p_m: float = 0.5
     motion: str = "levy"
 
@@ -183,10 +194,13 @@ def advance(field: Field) -> int:
     free = 0
     for k in range(prey.shape[0]):
         if prey[k, FREE] == 1:
-            # A free prey goes where the reset had it go, and stays free unless it meets the agent there.
+            # A free prey goes where the reset had it go, and stays free unless it meets the agent: there, or, by the
+            # library's rules, where it was before.
+            before = prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]
             row, column = field.places[t, k, 0], field.places[t, k, 1]
-            prey[k, PREY_ROW], prey[k, PREY_COLUMN] = row, column
-            if row != agent[ROW] or column != agent[COLUMN]:
+            if not (field.library and before):
+                prey[k, PREY_ROW], prey[k, PREY_COLUMN] = row, column
+            if not (before if field.library else row == agent[ROW] and column == agent[COLUMN]):
                 last_free[k] = t
                 free += 1
                 continue
@@ -222,10 +236,10 @@ def step(field: Field, action: NDArray[np.float64], terms: NDArray[np.float64]) 
     terms[:] = 0.0
     if not move(field.path, agent, action):
         return FAILED
-    # Stepping onto a prey catches it.
+    # Stepping onto a prey catches it, by the library's rules when the next step begins.
     free = 0
     for k in range(prey.shape[0]):
-        if prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
+        if not field.library and prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
             prey[k, FREE] = 0
         free += prey[k, FREE]
     # Prey may run into the agent, which ends the episode too if they were the last.

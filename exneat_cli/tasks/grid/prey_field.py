@@ -52,6 +52,7 @@ class Field(NamedTuple):
     keep: float  #: share of the field that is left after a step
     motion: float  #: chance that a prey moves in a step; 0 where prey never move
     levy: bool  #: straight flights, else a new direction for each move
+    library: bool  #: whether prey are caught before they move alone, and may start where the agent does
 
 
 def bell(width: int) -> NDArray[np.float64]:
@@ -62,11 +63,12 @@ def bell(width: int) -> NDArray[np.float64]:
 
 @compiled
 def draw_prey(field: Field, rng: Generator) -> None:
-    """Put prey on distinct tiles but the centre, and draw where they go and what they emit at every step."""
+    """Put prey on distinct tiles, and draw where they go and what they emit at every step."""
     field.path[:] = 0
     field.path[1:-1, 1:-1] = 1
     vacant, centre = field.path.copy(), field.path.shape[0] // 2
-    vacant[centre, centre] = 0  # where the agent starts
+    if not field.library:
+        vacant[centre, centre] = 0  # where the agent starts
     field.start[:] = draw_tiles(vacant, field.start.shape[0], rng)
     walkers = np.zeros((field.start.shape[0], 4), np.int64)
     walkers[:, :2] = field.start
@@ -85,7 +87,7 @@ def draw_moment(
     """
     # Arrays are taken out of the tuple once: passing the tuple on costs more than what the callees do.
     path, cues = field.path, field.cues
-    # The field decays: one flat loop, which the compiler turns into vector instructions.
+    # A share of the field persists: one flat loop, which the compiler turns into vector instructions.
     now = cues[t].reshape(cues[t].size)
     if t == 0:
         now[:] = 0.0

@@ -65,6 +65,13 @@ class GridTask(Task):
         Part("down", sensors=(6, 7), actuators=(3,), position=(0.0, -1.0)),
     )
     """Each senses two channels and gives the value of moving there."""
+    came_later: ClassVar[dict[str, Any]] = {}
+    """Parameters that came later, with the value that gives what was before: with it they are no part of hashes."""
+
+    def identity(self) -> dict[str, Any]:
+        """The parameters, but for those of `came_later` that change nothing."""
+        plain = super().identity()
+        return {name: value for name, value in plain.items() if (name, value) not in self.came_later.items()}
 
     @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -120,12 +120,15 @@ def test_start_and_goal_are_two_different_corners_and_all_pairs_occur() -> None:
     assert chisquare(list(pairs.values())).pvalue > 1e-4
 
 
-def test_cues_of_a_general_maze_rise_evenly_to_one_half_at_the_goal() -> None:
-    maze = general(5)
+@pytest.mark.parametrize("weights", [(0.5, 0.5), (0.2, 0.8), (1, 0)])
+def test_cues_of_a_general_maze_rise_evenly_to_the_weight_of_their_channel_at_the_goal(
+    weights: tuple[float, float],
+) -> None:
+    maze = general(5, channel_weights=weights)
     on_path = maze.path == 1
-    expected = (maze.goal[FURTHEST] - maze.distances[on_path]) / maze.goal[FURTHEST] / 2
+    expected = (maze.goal[FURTHEST] - maze.distances[on_path]) / maze.goal[FURTHEST]
     for channel in (0, 1):
-        np.testing.assert_allclose(maze.signals[channel][on_path], expected)
+        np.testing.assert_allclose(maze.signals[channel][on_path], weights[channel] * expected)
         assert not maze.signals[channel][~on_path].any()
 
 
@@ -159,6 +162,15 @@ def test_a_track_leads_on_one_channel_misleads_on_the_other_and_is_silent_in_the
         assert not behind[leading].any()
         kinds.add((side, leading))
     assert len(kinds) == 4
+
+
+def test_the_second_channel_can_lead_on_every_track_without_other_changes() -> None:
+    for seed in range(40):
+        one, other = track(seed), track(seed, leading="second")
+        silent = (other.signals == 0).sum(axis=(1, 2))
+        assert silent[1] > silent[0]
+        np.testing.assert_array_equal(one.goal, other.goal)
+        np.testing.assert_array_equal(np.sort(one.signals, axis=0), np.sort(other.signals, axis=0))
 
 
 def test_cue_noise_lies_on_path_tiles_alone_and_never_below_zero() -> None:

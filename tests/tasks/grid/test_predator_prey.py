@@ -33,7 +33,8 @@ class SlowField:
     """
 
     def __init__(self, task: Foraging, field: Field) -> None:
-        self.task, self.keep = task, 1.0 - task.p_c
+        self.task, self.keep = task, task.p_c
+        self.library = task.rules == "library"
         self.ways, self.path = field.places, field.path
         before = np.concatenate([np.zeros_like(field.cues[:1]), field.cues[:-1]])
         self.emissions = field.cues - self.keep * before
@@ -51,7 +52,8 @@ class SlowField:
             if not self.free[k]:
                 continue
             self.places[k] = tuple(self.ways[self.steps, k].tolist())
-            self.catch(k)
+            if not self.library:
+                self.catch(k)
             if not self.free[k]:
                 continue
             channels = [0, 1] if isinstance(self.task, Hunting) else [k % 2]
@@ -72,7 +74,7 @@ class SlowField:
         if self.path[tile]:
             self.agent = tile
         self.steps += 1
-        for k in range(self.task.n_prey):
+        for k in range(0 if self.library else self.task.n_prey):
             self.catch(k)
         if self.steps < self.task.steps and any(self.free):
             self.advance()
@@ -129,6 +131,7 @@ def small_tasks(draw: st.DrawFn) -> Foraging:
         "p_e": draw(st.floats(0.0, 1.0)),
         "p_c": draw(st.floats(0.0, 1.0)),
         "patch_width": draw(st.sampled_from([1, 3, 5])),
+        "rules": draw(st.sampled_from(["own", "library"])),
     }
     if draw(st.booleans()):
         return Foraging(**parameters)
@@ -175,13 +178,42 @@ def test_foraging_prey_alternate_channels_and_hunting_prey_use_both() -> None:
 
 def test_stepping_onto_a_prey_catches_it_and_the_last_one_ends_the_episode() -> None:
     field, terms = field_of(Foraging(n_prey=2)), np.zeros(1)
-    field.start[:] = field.places[:] = (6, 7), (6, 8)
+    field.start[:] = field.places[:] = (4, 5), (4, 6)
     rewind(field)
     right = ACTIONS[MOVES.index("right")]
     assert step(field, right, terms) == RUNNING
     assert (list(field.prey[:, FREE]), terms[0]) == ([0, 1], 0.0)
     assert step(field, right, terms) == ENDED
     assert terms[0] == 1.0
+
+
+@pytest.mark.parametrize(("rules", "caught"), [("own", 1.0), ("library", 0.0)])
+def test_by_the_librarys_rules_the_last_move_catches_nothing(rules: str, caught: float) -> None:
+    field, terms = field_of(Foraging(n_prey=1, steps=1, rules=rules)), np.zeros(1)
+    field.start[:] = field.places[:] = (4, 5)
+    rewind(field)
+    assert step(field, ACTIONS[MOVES.index("right")], terms) == ENDED
+    assert terms[0] == caught
+
+
+@pytest.mark.parametrize(("rules", "free"), [("own", 0), ("library", 1)])
+def test_by_the_librarys_rules_prey_that_walk_onto_the_agent_get_away_if_it_moves_on(rules: str, free: int) -> None:
+    field, terms = field_of(Hunting(n_prey=2, rules=rules)), np.zeros(1)
+    field.start[:] = field.places[:] = (4, 5), (1, 1)
+    field.places[0, 0] = (4, 4)
+    rewind(field)
+    assert field.prey[0, FREE] == free
+    assert step(field, ACTIONS[MOVES.index("left")], terms) == RUNNING
+    assert field.prey[0, FREE] == free
+
+
+def test_linear_fusion_reaches_by_the_librarys_rules_what_it_reaches_in_the_library() -> None:
+    # Measured with Multimodal_mazes itself: 10 tiles a side, cues of which half persist, sensor noise 0.02.
+    common = {"size": 10, "p_c": 0.5, "rules": "library"}
+    for task, reached in ((Foraging(**common), 0.32), (Hunting(**common), 0.72)):
+        with Runner(task, Noise(0.02), Executor(), training=False) as runner:
+            fusion = runner.run([linear_fusion(8, 5, task.parts)], shared_episodes("test", 1000))
+        assert fusion.fitness.mean() == pytest.approx(reached, abs=0.05)
 
 
 @pytest.mark.parametrize("task", [Foraging(), Hunting()])
@@ -191,4 +223,4 @@ def test_following_the_cues_is_far_better_than_chance(task: Foraging) -> None:
     with Runner(task, Noise(), Executor(), training=False) as runner:
         fusion = runner.run([linear_fusion(8, 5, task.parts)], seeds)
         luck = runner.run(None, own)
-    assert fusion.fitness.mean() > 2.0 * luck.fitness.mean()
+    assert fusion.fitness.mean() > luck.fitness.mean() + 0.2
