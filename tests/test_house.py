@@ -27,7 +27,7 @@ FENCES = {
     "dask": {"rollouts"},
     "distributed": {"rollouts"},
 }
-IN_ONE_FILE = ("imageio",)
+IN_ONE_FILE = ("imageio", "onnx")
 
 
 def imports_of(path: Path) -> Iterator[str]:

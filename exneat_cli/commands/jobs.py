@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import glob
 import threading
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from exneat_cli.commands.command_line import CommandLine
@@ -101,6 +103,22 @@ def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
     """Let what the settings of a task would import be imported, as far as the user named it himself."""
     code = code_in(check_section("task", plain.get("task", {})))
     NAMED.update(reference for key, reference in code.items() if line.names(key))
+
+
+def finished_runs(pattern: object) -> list[RunDirectory]:
+    """The run directories that ``run=`` names.
+
+    Raises:
+        ExneatError: it is no text, or a pattern that fits none.
+    """
+    if not isinstance(pattern, str) or not pattern:
+        raise ConfigError("run", "a run directory, or a pattern such as 'outputs/ant/*'", pattern)
+    if not glob.has_magic(pattern) or Path(pattern).is_dir():
+        return [RunDirectory(Path(pattern))]
+    found = [run for path in sorted(glob.glob(pattern)) if (run := RunDirectory(Path(path))).is_there()]
+    if not found:
+        raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
+    return found
 
 
 def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:

@@ -15,6 +15,8 @@ from exneat_cli.tasks.task import (
     ENDED,
     FAILED,
     RUNNING,
+    Adapter,
+    HasAdapter,
     HasBatch,
     HasDistance,
     HasFullReward,
