@@ -18,6 +18,7 @@ COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
     "sweep": "train all variants of an experiment and test how they hold up",
     "evaluate": "test finished runs under perturbations",
+    "watch": "film a run's champion, its networks beside it",
     "report": "make tables, figures and a page of them from the runs there are",
     "export": "write a run's champion for use elsewhere",
     "inspect": "show a run's wiring, or list the runs",
@@ -44,6 +45,7 @@ usage: exneat <command> [key=value ...]
   exneat train task=custom task.kind=my_module:MyTask   and so is this class
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
+  exneat watch run=outputs/ant/<run>            a film of the champion
   exneat report                                 outputs/report/index.html
   exneat export run=outputs/ant/<run> format=python     the champion as one file of Python; also onnx, neat, dot
   exneat inspect                                the runs under outputs/

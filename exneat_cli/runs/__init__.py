@@ -5,3 +5,4 @@ from exneat_cli.runs.robustness import check_sweeps, is_finished, load_champion,
 from exneat_cli.runs.run import Finished, train
 from exneat_cli.runs.scores import summary_sentence
 from exneat_cli.runs.settings import RunSettings, read_task
+from exneat_cli.runs.watching import Scene, record_champion

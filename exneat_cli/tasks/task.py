@@ -261,6 +261,24 @@ class HasAdapter(Protocol):
         """How readings become what brains sense, and what brains put out becomes controls."""
 
 
+class Camera(Protocol):
+    """Draws what a world was; belongs to one process."""
+
+    def draw(self, snapshot: Any) -> NDArray[np.uint8]:
+        """(height, width, 3) the picture of a `HasPicture.snapshot`."""
+
+
+@runtime_checkable
+class HasPicture(Protocol):
+    """A task whose world can be filmed."""
+
+    def snapshot(self, world: Any) -> Any:
+        """What a picture of the world as it is now needs, as data that other processes can read."""
+
+    def camera(self, width: int, height: int) -> Camera:
+        """Something that makes pictures of snapshots, of so many pixels."""
+
+
 @runtime_checkable
 class HasBatch(Protocol):
     """A task of which many worlds run side by side on a GPU."""

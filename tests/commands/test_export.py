@@ -16,7 +16,7 @@ from exneat_cli.main import main
 from exneat_cli.records.exports import FORMATS
 from tests.commands.refusals import check_refusal
 
-OPTIONAL = ("onnx", "onnxruntime")
+OPTIONAL = ("onnx", "onnxruntime", "imageio_ffmpeg")
 """Libraries of extras, which one command each needs."""
 TRAIN = ["train", "task=track_maze", "budget=smoke"]
 

@@ -25,7 +25,7 @@ from exneat_cli.tasks.robots.body import SYMMETRIES, Body, check_parts, take_apa
 from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
 from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off, with_unit
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
-from exneat_cli.tasks.task import Adapter, Part, Simulation, Task, setting
+from exneat_cli.tasks.task import Adapter, Camera, Part, Simulation, Task, setting
 
 REWARDS = ("thesis", "gymnasium")
 THESIS_CONTROL_WEIGHT = 0.01
@@ -233,6 +233,16 @@ class RobotTask(Task):
         functions = (dynamics.reset, dynamics.rewind, dynamics.observe, dynamics.step, dynamics.locate)
         sense, drive = (dynamics.sense, dynamics.drive) if self.frame == "part" else (None, None)
         return Simulation(world, *functions, sense=sense, drive=drive, owner=(model, data))
+
+    def snapshot(self, world: dynamics.RobotWorld) -> NDArray[np.float64]:
+        """(nq,) the pose."""
+        return world.qpos.copy()
+
+    def camera(self, width: int, height: int) -> Camera:
+        """MuJoCo's renderer, which needs EGL, OSMesa or a screen."""
+        from exneat_cli.tasks.robots.picture import RobotCamera
+
+        return RobotCamera(load(self.model), self._anatomy[0].trunk, width, height)
 
     def adapter(self) -> Adapter:
         """Parts' own frames, and the range of the controls."""
