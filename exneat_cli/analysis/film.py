@@ -21,9 +21,10 @@ from exneat_cli.analysis.network_layout import Node
 from exneat_cli.records import Champion
 
 Pixels = NDArray[np.uint8]
-DPI = 100
+DPI, NATURAL = 100, 640
+"""Pixels to an inch of networks, and the width in pixels below which they are drawn smaller as a whole."""
 SIZE, BAR = 15, 23
-"""Of the letters of titles and captions, and of the bars above and below a picture that they stand in, in pixels."""
+"""Pixels of the letters of titles and captions, smaller for long ones, and of the bars around pictures for them."""
 _LEGEND = "nodes: blue above 0, red below; full colour: the node's largest value so far"
 
 
@@ -37,11 +38,13 @@ class Panel:
     """
 
     def __init__(self, champion: Champion, nodes: Sequence[Node], width: int, height: int) -> None:
-        inches = width / DPI, (height - BAR) / DPI
+        scale = min(1.0, width / NATURAL)
+        dpi = DPI * scale
+        inches = width / dpi, (height - BAR) / dpi
         with styles.style():
-            figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+            figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
             canvas = FigureCanvasAgg(figure)
-            axes = figure.add_axes((0.0, 0.0, 1.0, inches[1] * DPI / height))
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - BAR / height))
             places = draw_still(axes, champion, *inches)
             figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=7.5, va="center")
             canvas.draw()  # type: ignore[no-untyped-call]
@@ -50,7 +53,7 @@ class Panel:
         spots = axes.transData.transform([places[node] for node in nodes])
         self._spots = [(float(x), height - float(y)) for x, y in spots]
         crowded = max(len(module.pins) for module in champion.plan.modules) > 30
-        self._radii = [(2.5 if crowded else 4.0) if key < 0 else 6.0 for _, key in nodes]
+        self._radii = [scale * ((2.5 if crowded else 4.0) if key < 0 else 6.0) for _, key in nodes]
 
     def draw(self, shares: NDArray[np.float64]) -> Pixels:
         """(height, width, 3) for (nodes,) values between -1 and 1."""
@@ -93,11 +96,14 @@ def _captioned(picture: Pixels, title: str, caption: str) -> Pixels:
     bars = []
     for text in (title, caption):
         bar = Image.new("RGB", (picture.shape[1], BAR), (255, 255, 255))
-        ImageDraw.Draw(bar).text((6, 2), text, fill=(20, 20, 20), font=_font())
+        brush = ImageDraw.Draw(bar)
+        sizes = (_font(size) for size in range(SIZE, 5, -1))
+        font = next((each for each in sizes if brush.textlength(text, font=each) <= bar.width - 12), _font(6))
+        brush.text((6, BAR // 2), text, fill=(20, 20, 20), font=font, anchor="lm")
         bars.append(np.asarray(bar))
     return np.concatenate([bars[0], picture, bars[1]])
 
 
 @functools.cache
-def _font() -> ImageFont.FreeTypeFont:
-    return ImageFont.truetype(f"{matplotlib.get_data_path()}/fonts/ttf/DejaVuSans.ttf", SIZE)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(f"{matplotlib.get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

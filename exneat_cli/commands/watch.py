@@ -29,7 +29,7 @@ from exneat_cli.errors import (
     check_text,
     check_whole,
 )
-from exneat_cli.records import VIDEO_FORMATS, check_video_library, write_video
+from exneat_cli.records import VIDEO_FORMATS, RunDirectory, check_video_library, write_video
 from exneat_cli.records.champion import Champion
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Scene, load_settings, record_champion
@@ -37,6 +37,8 @@ from exneat_cli.tasks import HasPicture, RobotTask, Task
 
 ROBOTS_FPS, GRID_FPS = 10.0, 4.0
 """Frames a second unless told otherwise: of a robot's own time, at most one a control step; of a grid world one each"""
+SHORT = 200
+"""Control steps of a film that training makes."""
 PORTION = 8
 """Frames that a process draws at a time."""
 _KEYS = ("run", "format", "panel", "episode", "seed", "level", "steps", "fps", "width", "height", "workers", "output")
@@ -75,6 +77,23 @@ def run(line: CommandLine) -> int:
     return 0
 
 
+def film_champion(directory: RunDirectory) -> None:
+    """Film the champion of a finished run for its plots, the first `SHORT` steps, unless it was filmed before.
+
+    Raises:
+        ExneatError: there is no renderer or no ffmpeg, or the task has no pictures.
+    """
+    path = directory.plots / "champion.mp4"
+    if path.exists():
+        return
+    check_video_library()
+    scene = record_champion(directory, episode=0, seed=None, sweep=None, steps=SHORT)
+    if isinstance(scene.task, RobotTask):
+        choose_renderer()
+    every, fps = _rhythm([scene], None)
+    write_video(path, drawn([scene], every, (640, 480), True, Executor().threads), fps, "mp4")
+
+
 def _check(plain: Mapping[str, Any]) -> None:
     check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
     check_choice("format", plain["format"], list(VIDEO_FORMATS))
@@ -94,7 +113,7 @@ def _check(plain: Mapping[str, Any]) -> None:
         check_text("output", plain["output"], "a file")
 
 
-def _sweep(plain: Mapping[str, Any], directory: Any) -> Sweep | None:
+def _sweep(plain: Mapping[str, Any], directory: RunDirectory) -> Sweep | None:
     """The sweep with the one level that is watched."""
     names, level = check_section("sweeps", plain["sweeps"]), plain["level"]
     if not names:

@@ -102,6 +102,27 @@ def test_a_robot_is_in_view_and_its_nodes_light_up(runs: Path) -> None:
     assert (frames[1][:, 640:] != frames[4][:, 640:]).any()
 
 
+def test_training_films_its_champion_once_if_asked_to_and_does_without_where_it_cannot(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    train = ["train", "task=track_maze", "budget=smoke", "video=true", f"output={tmp_path}"]
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "imageio_ffmpeg", None)
+        assert main(train) == 0
+    said = capfd.readouterr().err
+    assert said.count("no video: expected ffmpeg") == 1
+    assert FFMPEG in said
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    assert main(train) == 0
+    (film,) = tmp_path.glob("track_maze/*/plots/champion.mp4")
+    made = film.stat().st_mtime_ns
+    assert len(decoded(film)) > 1
+    assert main(train) == 0
+    assert film.stat().st_mtime_ns == made
+    assert main([*train, "algorithm=random"]) == 0
+    check_refusal([*train, "video=1"], ["video: expected true or false"], tmp_path, capfd)
+
+
 BAD = {
     "format=avi": "format: expected one of mp4, gif, webp, got 'avi'",
     "panel=all": "panel: expected one of networks, none",

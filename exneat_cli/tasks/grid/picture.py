@@ -11,9 +11,10 @@ Snapshot = tuple[NDArray[np.float64], tuple[int, int], list[tuple[int, int]]]
 
 def coloured(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]) -> NDArray[np.float64]:
     """(N, N, 3) one colour per tile, between 0 and 1."""
-    # Silent tiles are white; channel 1 takes away green and blue (red stays), channel 2 red and green.
+    # Silent tiles are white; channel 1 takes away green and blue (red stays), channel 2 red and green. Where both are
+    # loud purple stays, which is no wall.
     cues = np.clip(tiles[..., 1:], 0.0, 1.0)
-    colours = np.stack([1.0 - cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - cues[..., 0]], axis=2)
+    colours = np.stack([1.0 - 0.7 * cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - 0.7 * cues[..., 0]], axis=2)
     colours[tiles[..., 0] == 0] = 0.0
     for row, column in targets:
         colours[row, column] = (1.0, 0.85, 0.0)
