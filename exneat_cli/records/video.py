@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -48,14 +49,15 @@ def write_video(path: Path, frames: Iterator[NDArray[np.uint8]], fps: float, for
     """
     library, count = _ffmpeg(), 0
     make_directory(path.parent)
-    temporary = path.with_name(f".{path.stem}.tmp.{form}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     writer = None
     try:
         temporary.touch()
         for picture in frames:
             if writer is None:
                 size = picture.shape[1], picture.shape[0]
-                options = {"fps": fps, "macro_block_size": 2, "ffmpeg_log_level": "error", **VIDEO_FORMATS[form]}
+                options = {"fps": fps, "macro_block_size": 2, "ffmpeg_log_level": "quiet", **VIDEO_FORMATS[form]}
+                options["output_params"] = [*options["output_params"], "-f", form]
                 writer = library.write_frames(str(temporary), size, **options)
                 writer.send(None)
             writer.send(np.ascontiguousarray(picture))
@@ -67,7 +69,8 @@ def write_video(path: Path, frames: Iterator[NDArray[np.uint8]], fps: float, for
             raise OSError(None, "ffmpeg wrote nothing")
         temporary.replace(path)
     except OSError as error:
-        raise ExneatError(f"{path}: could not be written: {error.strerror or error}") from error
+        why = error.strerror or " ".join(str(error).split())[:200]
+        raise ExneatError(f"{path}: could not be written: {why}; check the disk and output=") from error
     finally:
         if writer is not None:
             writer.close()

@@ -16,6 +16,7 @@ from PIL import Image
 from exneat_cli.commands import watch
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
+from exneat_cli.records import VIDEO_FORMATS
 from tests.commands.refusals import check_refusal
 
 FFMPEG = "pip install 'exneat[video]'"
@@ -121,6 +122,18 @@ def test_training_films_its_champion_once_if_asked_to_and_does_without_where_it_
     assert film.stat().st_mtime_ns == made
     assert main([*train, "algorithm=random"]) == 0
     check_refusal([*train, "video=1"], ["video: expected true or false"], tmp_path, capfd)
+
+
+def test_a_film_that_cannot_be_finished_leaves_what_was_there(
+    runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    before = tmp_path / "film.mp4"
+    before.write_bytes(b"before")
+    monkeypatch.setitem(VIDEO_FORMATS, "mp4", {"codec": "none such", "output_params": []})
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    arguments = ["watch", f"run={run}", "workers=1", "width=64", "height=64", f"output={before}"]
+    check_refusal(arguments, ["film.mp4: could not be written"], tmp_path, capfd)
 
 
 BAD = {
