@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ant test check tests docs format reproduce report bench equivalence torture wheel clean
+.PHONY: help ant walking.gif test check tests docs format reproduce report bench equivalence torture wheel clean
 
 # Reports take the largest budget that has runs unless BUDGET is given.
 OF_BUDGET := $(if $(BUDGET),budget=$(BUDGET))
@@ -51,6 +51,11 @@ sweep-%: $(VENV)/installed ## all runs of one experiment that are missing, e.g. 
 reproduce: $(VENV)/installed ## train what is missing of all experiments, then report: make reproduce BUDGET=quick|paper
 	@status=0; for experiment in $(EXPERIMENTS); do $(MAKE) --no-print-directory sweep-$$experiment || status=1; done; \
 	$(BIN)/exneat report budget=$(BUDGET) && exit $$status
+
+walking.gif: $(VENV)/installed ## six seconds of a champion for the README, at most 3 MB: make walking.gif RUN=outputs/ant/<run>
+	@test -n "$(RUN)" || { echo "RUN=outputs/ant/<run> names the run"; exit 2; }
+	$(BIN)/exneat watch run=$(RUN) format=gif steps=120 width=360 height=270 output=docs/images/walking.gif
+	@test $$(wc -c < docs/images/walking.gif) -le 3000000 || { echo "docs/images/walking.gif is above 3 MB"; exit 1; }
 
 report: $(VENV)/installed ## every table and figure from the runs there are; trains nothing
 	$(BIN)/exneat report $(OF_BUDGET)

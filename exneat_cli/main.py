@@ -17,7 +17,9 @@ COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
     "sweep": "train all variants of an experiment and test how they hold up",
     "evaluate": "test finished runs under perturbations",
+    "watch": "film a run's champion, its networks beside it",
     "report": "make tables, figures and a page of them from the runs there are",
+    "export": "write a run's champion for use elsewhere",
     "inspect": "show a run's wiring, or list the runs",
     "doctor": "say whether this machine is fit for exneat, and how to fix what is not",
 }
@@ -42,7 +44,9 @@ usage: exneat <command> [key=value ...]
   exneat train task=custom task.kind=my_module:MyTask   and so is this class
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
+  exneat watch run=outputs/ant/<run>            a film of the champion
   exneat report                                 outputs/report/index.html
+  exneat export run=outputs/ant/<run> format=python     the champion as one file of Python; also onnx, neat, dot
   exneat inspect                                the runs under outputs/
   exneat inspect run=outputs/ant/<run>          one run's modules, sensors and joints
   exneat doctor                                 whether this machine is fit for exneat

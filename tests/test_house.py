@@ -24,10 +24,11 @@ FENCES = {
     "cmaes": {"algorithms"},
     "matplotlib": {"analysis"},
     "jinja2": {"analysis"},
+    "PIL": {"analysis"},
     "dask": {"rollouts"},
     "distributed": {"rollouts"},
 }
-IN_ONE_FILE = ("imageio",)
+IN_ONE_FILE = ("imageio_ffmpeg", "onnx")
 
 
 def imports_of(path: Path) -> Iterator[str]:

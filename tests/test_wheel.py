@@ -55,9 +55,16 @@ def test_the_wheel_asks_for_every_library_that_it_imports(unpacked: Path) -> Non
             else []
         )
     }
-    distributions = {"hydra": "hydra-core", "neat": "neat-python", "yaml": "pyyaml"}
+    distributions = {"hydra": "hydra-core", "neat": "neat-python", "yaml": "pyyaml", "PIL": "pillow"}
     libraries = {distributions.get(name, name) for name in imported - set(sys.stdlib_module_names) - {"exneat_cli"}}
-    of_extras = {"dask", "distributed", "mujoco_warp", "warp"}  # imported after a check that they are there
+    of_extras = {
+        "dask",
+        "distributed",
+        "mujoco_warp",
+        "onnx",
+        "imageio_ffmpeg",
+        "warp",
+    }  # imported after a check that they are there
     assert libraries - of_extras == required
 
 

@@ -9,7 +9,7 @@ from exneat_cli.algorithms.exneat import JUDGINGS, NEAT, Coevolution, ExNEAT
 from exneat_cli.algorithms.neat.conversion import from_stock, pack_teams, to_stock, unpack_teams
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.neat_python import neat_config
+from exneat_cli.algorithms.neat.neat_python import config_text, neat_config
 from exneat_cli.algorithms.neat.settings import RECURRENT, EvolutionSettings
 from exneat_cli.algorithms.openai_es import OpenAIES
 from exneat_cli.algorithms.pairing import PAIRINGS

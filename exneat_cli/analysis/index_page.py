@@ -101,8 +101,21 @@ def _facts(study: Study) -> dict[str, Any]:
         "env_steps": f"{study.results['env_steps'].sum():,.0f}",
         "time": timedelta(seconds=round(study.results["wall_seconds"].sum())),
         "budgets": budget_sentence([study.spent_in(each, study.trained_variants) for each in conditions]),
+        "films": _films(study),
         "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
+
+
+def _films(study: Study) -> dict[str, Path]:
+    """Of each variant in each condition, in words, the film of the best filmed run on validation episodes."""
+    best: dict[str, tuple[float, Path]] = {}
+    for run, manifest in study.finished.items():
+        film, result = run.directory.plots / "champion.mp4", manifest.result
+        if result is not None and result.validation is not None and film.exists():
+            words = f"{study.variants[run.variant]}, {study.conditions[run.condition]}"
+            if words not in best or result.validation > best[words][0]:
+                best[words] = result.validation, film
+    return {words: film for words, (_, film) in best.items()}
 
 
 def _missing(studies: Mapping[str, Study], missing: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:

@@ -90,6 +90,20 @@ def draw_champion(axes: Axes, champion: Champion, width: float, height: float) -
         _name_inputs(axes, champion, m, places)
 
 
+def draw_still(axes: Axes, champion: Champion, width: float, height: float) -> Places:
+    """Draw a champion without its nodes; returns their places, for somebody else to draw them on."""
+    boxes, places = layout.lay_out(champion, width, height, named=False)
+    used = layout.used_nodes(champion)
+    axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
+    axes.set_axis_off()
+    _draw_links(axes, champion, places, used)
+    _draw_edges(axes, champion, places, used)
+    for m, box in enumerate(boxes):
+        _draw_box(axes, champion, m, box)
+        _name_outputs(axes, champion, m, places)
+    return places
+
+
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
     """Say what lines and shapes mean, as far as they occur in one of `champions`."""
     thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
@@ -189,6 +203,12 @@ def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: se
         if nodes:
             x, y = zip(*(places[node] for node in nodes), strict=True)
             axes.scatter(x, y, size, faces, marker=marker, edgecolors=rims, linewidths=0.7, zorder=3)
+    _name_outputs(axes, champion, m, places)
+
+
+def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
+    """Write above each output the actuator that it drives, if any."""
+    module = champion.plan.modules[m]
     if not module.drives:
         return
     # The unit has a line of its own.

@@ -132,8 +132,11 @@ def natural_size(champion: Champion) -> tuple[float, float]:
     return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 13.0).clip(4.0))
 
 
-def lay_out(champion: Champion, width: float, height: float) -> tuple[list[Bbox], Places]:
-    """Place every module in a box, and the nodes within it, on a page of the given size; rows of boxes are centred."""
+def lay_out(champion: Champion, width: float, height: float, *, named: bool = True) -> tuple[list[Bbox], Places]:
+    """Place every module in a box, and the nodes within it, on a page of the given size; rows of boxes are centred.
+
+    If `named`, there is room for the names of inputs.
+    """
     rows = _rows(champion.plan.modules)
     columns = max(len(row) for row in rows)
     box_width = (width - (columns - 1) * GAP) / columns
@@ -145,7 +148,7 @@ def lay_out(champion: Champion, width: float, height: float) -> tuple[list[Bbox]
         bottom = height - (r + 1) * box_height - r * GAP
         for c, m in enumerate(row):
             boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
-            places |= _places(champion, m, boxes[m])
+            places |= _places(champion, m, boxes[m], below_inputs(champion) if named else BELOW)
     return [boxes[m] for m in sorted(boxes)], places
 
 
@@ -168,12 +171,12 @@ def _rows(modules: Sequence[Module]) -> list[list[int]]:
     return [sorted(row, key=lambda m: (right[m], m)) for row in rows]
 
 
-def _places(champion: Champion, m: int, box: Bbox) -> Places:
+def _places(champion: Champion, m: int, box: Bbox, below: float) -> Places:
     """Inputs of module `m` at the bottom, outputs at the top, hidden nodes in layers between them."""
     module = champion.plan.modules[m]
     edges = [edge for edge in edges_of(champion) if edge[0][0] == m]
     hidden = [node for node in hidden_of(champion) if node[0] == m]
-    bottom, top = box.y0 + below_inputs(champion), box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
+    bottom, top = box.y0 + below, box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
     groups = input_groups(champion, m)
     slots = _spread(box, len(module.pins) + len(groups) - 1)
     # An empty slot between groups.

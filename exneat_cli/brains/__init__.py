@@ -2,4 +2,5 @@
 
 from exneat_cli.brains.assembly import assemble
 from exneat_cli.brains.brain import Brains
+from exneat_cli.brains.memory import places_in_memory
 from exneat_cli.brains.rules import acting_by_rule, linear_fusion, motionless

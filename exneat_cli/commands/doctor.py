@@ -47,7 +47,7 @@ if (data.qpos != expected.qpos).any():
     raise SystemExit("compiled code steps MuJoCo otherwise than MuJoCo's own Python bindings")
 print(f"MuJoCo {mujoco.__version__} stepped from compiled code, as by its own bindings")
 """
-_FRAME = """
+FRAME = """
 import os, mujoco
 model = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><light pos="0 0 3"/><geom size="1"/></worldbody></mujoco>')
@@ -136,7 +136,7 @@ def _enough(found: int, what: str) -> str:
 
 def _rendering() -> str:
     egl = {} if "MUJOCO_GL" in os.environ or sys.platform != "linux" else {"MUJOCO_GL": "egl"}  # needs no screen
-    return said_by(["-c", _FRAME], 60.0, **egl)
+    return said_by(["-c", FRAME], 60.0, **egl)
 
 
 def said_by(arguments: Sequence[str], seconds: float = 180.0, **environment: str) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import glob
-
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import name_code, with_sweeps
-from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_path, check_section
-from exneat_cli.records import RunDirectory, build, runs_at
+from exneat_cli.commands.jobs import finished_runs, name_code, with_sweeps
+from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
+from exneat_cli.records import build
 from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
 
@@ -26,7 +24,7 @@ def run(line: CommandLine) -> int:
     where = check_section("executor", plain.get("executor", {}))
     build(Executor, where, "executor.")
     planned = []
-    for directory in _directories(plain["run"]):
+    for directory in finished_runs(plain["run"]):
         try:
             planned.append((directory, with_sweeps("", load_settings(directory), plain)))
         except ConfigError as error:
@@ -38,12 +36,3 @@ def run(line: CommandLine) -> int:
         came = f"{directory.robustness}: {tested} levels tested now"
         print(came if tested else f"{directory.path}: all there already")
     return 0
-
-
-def _directories(pattern: object) -> list[RunDirectory]:
-    path = check_path("run", pattern, "a run directory, or a pattern such as 'outputs/ant/*'")
-    if found := runs_at(path):
-        return found
-    if not glob.has_magic(str(path)):
-        return [RunDirectory(path)]  # whose reader says that it is not there
-    raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import glob
+import sys
 import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_keys, check_section
-from exneat_cli.records import RunDirectory
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_keys, check_path, check_section
+from exneat_cli.records import RunDirectory, runs_at
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_finished, run_robustness, train
 from exneat_cli.tasks.user_code import NAMED, code_in
@@ -27,12 +29,13 @@ _OF_SWEEPS = ("parameter", "label", "levels")
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """One run: what it is called, its settings, its robustness sweeps, and the test episodes per level."""
+    """One run: what it is called, its settings, sweeps, test episodes per level, and whether it is filmed."""
 
     name: str
     settings: RunSettings
     sweeps: tuple[Sweep, ...]
     episodes: int
+    video: bool = False
 
     def is_finished(self) -> bool:
         """Whether the run is done and was tested at every level; a damaged one is not."""
@@ -50,7 +53,19 @@ class Job:
         finished = train(self.settings, progress=progress, command=command, go_on=go_on)
         with _one_at_a_time:
             self.test(finished.directory, self.settings.executor, progress)
+            if self.video and not self.settings.algorithm.rule:
+                self._film(finished.directory)
         return finished
+
+    def _film(self, directory: RunDirectory) -> None:
+        """Film the champion, unless it was filmed before; whatever is missing for that costs a line, not the run."""
+        from exneat_cli.commands.watch import film_champion
+
+        try:
+            film_champion(directory)
+        except ExneatError as error:
+            why = str(error).splitlines()
+            print(f"exneat: {directory.path.name}: no video: {'; '.join(map(str.strip, why))}", file=sys.stderr)
 
     def test(self, directory: RunDirectory, executor: Executor, progress: Progress) -> int:
         """Test the finished run at the levels that are missing, and draw the figures that are; returns how many levels.
@@ -103,6 +118,20 @@ def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
     NAMED.update(reference for key, reference in code.items() if line.names(key))
 
 
+def finished_runs(pattern: object) -> list[RunDirectory]:
+    """The run directories that ``run=`` names.
+
+    Raises:
+        ExneatError: it is no text, or a pattern that fits none.
+    """
+    path = check_path("run", pattern, "a run directory, or a pattern such as 'outputs/ant/*'")
+    if found := runs_at(path):
+        return found
+    if not glob.has_magic(str(path)):
+        return [RunDirectory(path)]  # whose reader says that it is not there
+    raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
+
+
 def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
     """Compose the settings of a run, beside which `others` may be set, check them, and make a job of them.
 
@@ -111,7 +140,8 @@ def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
     """
     plain = line.compose()
     name_code(line, plain)
-    check_keys("", plain, (*_SETTINGS, "recipe", "budget", "budgets", "sweep", "sweeps", *others))
+    check_keys("", plain, (*_SETTINGS, "recipe", "budget", "budgets", "sweep", "sweeps", "video", *others))
+    check_flag("video", plain.get("video", False))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)
         check_keys(f"budgets.{budget}.", check_section(f"budgets.{budget}", spent), _SPENT)
@@ -122,7 +152,7 @@ def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
         if plain.get("recipe") == "walking" and key in _OF_MODULES:
             fix = "; ".join(filter(None, [fix, "recipe=thesis has hidden nodes and a central module"]))
         raise ConfigError(key, expected, came, fix) from error
-    return with_sweeps(name, settings, plain)
+    return dataclasses.replace(with_sweeps(name, settings, plain), video=plain.get("video", False))
 
 
 def with_sweeps(name: str, settings: RunSettings, plain: Mapping[str, Any]) -> Job:

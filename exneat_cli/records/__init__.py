@@ -18,3 +18,4 @@ from exneat_cli.records.tables import (
     write_csv,
     write_history,
 )
+from exneat_cli.records.video import VIDEO_FORMATS, check_video_library, write_video

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from exneat_cli.compiling import compiled_lean, with_functions
 from exneat_cli.interruption import uninterrupted
 from exneat_cli.rollouts.settings import Noise
 from exneat_cli.seeding import EpisodeSeeds, generator
-from exneat_cli.tasks import RUNNING, HasInitialPose, Simulation, Task
+from exneat_cli.tasks import RUNNING, HasInitialPose, HasPicture, Simulation, Task
 
 Acting = tuple[Brains, NDArray[np.float64], NDArray[np.float64]]
 """Brains, and low and span, (A,) each: low + U(0, span) is added to their actions."""
@@ -191,6 +191,51 @@ def run_shares(
         rngs, own = map(generator, episodes[episode]), tuple(values[episode] for values in tally)
         with uninterrupted():
             loop(simulation.world, brains, *chosen, *rngs, disturbance, buffers, halt, own, trace, located)
+
+
+class Recording(NamedTuple):
+    """One episode of one brain, step by step.
+
+    Attributes:
+        snapshots: T of them, what the world was when the brain sensed it, see `exneat_cli.tasks.HasPicture`.
+        values: (T, memory) the brain's value vector after each step.
+        trace: (T + 1, columns) as of `exneat_cli.rollouts.Trace`.
+    """
+
+    snapshots: list[Any]
+    values: NDArray[np.float64]
+    trace: NDArray[np.float64]
+
+
+def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, steps: int) -> Recording:
+    """Run an episode, of at most so many steps, in the same loop as all others, but step by step in plain Python."""
+    assert isinstance(task, Task)
+    simulation, halt = open_world(task, noise, training=False), np.zeros(1, np.bool_)
+    ties = np.full(len(task.actuator_names), task.tie_noise)
+    disturbance = (float(noise.sensor_std), *map(float, task.observation_limits), 0.0 * ties, ties)
+    buffers = _buffers(task, simulation, brain, noise.sensor_std > 0.0, bool(ties.any()))
+    snapshots: list[Any] = []
+    values: list[NDArray[np.float64]] = []
+
+    def observe(world: Any, readings: NDArray[np.float64]) -> None:
+        snapshots.append(task.snapshot(world))
+        simulation.observe(world, readings)
+
+    def step(world: Any, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
+        values.append(buffers[0].copy())
+        halt[0] = len(values) == steps
+        return int(simulation.step(world, action, terms))
+
+    nothing = _unchanged.py_func  # type: ignore[attr-defined]
+    names = ("reset", "rewind", "sense", "drive", "locate")
+    functions = {name: getattr(simulation, name) or nothing for name in names}
+    loop = with_functions(_episodes, task.name, observe=observe, step=step, **functions)
+    tally = tuple(each[0] for each in empty_tally(task, 1, 1, moments=False))
+    located = len(task.trace_columns)
+    trace = np.zeros((task.longest_episode + 1, located + len(task.terms)))
+    with uninterrupted():
+        loop(simulation.world, brain, 0, 1, *map(generator, seeds), disturbance, buffers, halt, tally, trace, located)
+    return Recording(snapshots, np.array(values), trace[: len(values) + 1].copy())
 
 
 def _buffers(

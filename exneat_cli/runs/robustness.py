@@ -10,7 +10,16 @@ from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_section, check_whole
-from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_champion, read_robustness, read_yaml
+from exneat_cli.records import (
+    DONE,
+    Champion,
+    RunDirectory,
+    Score,
+    merge_robustness,
+    read_champion,
+    read_robustness,
+    read_yaml,
+)
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
@@ -129,10 +138,21 @@ def _write(directory: RunDirectory, settings: RunSettings, sweep: Sweep, scores:
 def _acting(directory: RunDirectory, settings: RunSettings) -> Brains | None:
     if settings.algorithm.rule is not None:
         return acting_by_rule(settings.algorithm.rule, settings.task)
+    return load_champion(directory, settings).brain()
+
+
+def load_champion(directory: RunDirectory, settings: RunSettings) -> Champion:
+    """The champion of a finished run with these settings.
+
+    Raises:
+        ExneatError: it has none, since it is a baseline, or its champion is damaged, unreadable or of another run.
+    """
+    if settings.algorithm.rule is not None:
+        raise ExneatError(f"run={directory.path}: has no champion: {settings.variant} is a baseline without networks")
     champion = read_champion(directory.champion)
     if champion.variant != settings.variant:
         variants = f"expected a champion of {settings.variant}, got {champion.variant}"
         raise ExneatError(f"{directory.champion}: {variants}")
     if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
         raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
-    return champion.brain()
+    return champion

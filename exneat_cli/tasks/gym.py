@@ -36,7 +36,7 @@ from exneat_cli.errors import (
     check_whole,
 )
 from exneat_cli.tasks.environments import Interface, in_words, interface_of, make
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task, setting
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Adapter, Part, Simulation, Task, setting
 
 LARGEST = 2**25
 """Readings, or entries of actions, in a longest episode, 256 MiB: noise needs room for all of them."""
@@ -141,6 +141,14 @@ class GymTask(Task):
         """Make the environment; `training` changes nothing."""
         world = _World(make(self.env_id, self.kwargs, self.max_steps), self._interface, self.env_id)
         return Simulation(world, _reset, _rewind, _observe, _step, compiled=False)
+
+    def adapter(self) -> Adapter:
+        """The bounds of a Box; several actions to choose from stay as they are."""
+        interface, ones = self._interface, np.ones(self._interface.actions)
+        if interface.is_discrete:
+            return Adapter(self.sensor_names, None, ones, 0.0 * ones, ones, bounded=False)
+        low, high = interface.low, interface.high
+        return Adapter(self.sensor_names, None, ones, 0.5 * (low + high), 0.5 * (high - low), bounded=True)
 
     @property
     def _interface(self) -> Interface:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,25 @@ class Simulation:
     drive: Callable[..., Any] | None = None
     compiled: bool = True
     owner: object = None
+
+
+class Adapter(NamedTuple):
+    """What stands between a simulator and a brain, as data, so that a champion can run elsewhere.
+
+    Attributes:
+        readings: names of the simulator's readings, with units.
+        frames: `exneat_cli.tasks.robots.frames.Frames`, how readings become what is sensed; None where they are that.
+        signs: (A,) of the brain's outputs.
+        middle, span: (A,) the controls are middle + span * action.
+        bounded: whether the action is cut to [-1, 1] before.
+    """
+
+    readings: tuple[str, ...]
+    frames: Any
+    signs: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    span: NDArray[np.float64]
+    bounded: bool
 
 
 class Task(ABC):
@@ -232,6 +251,32 @@ class HasDistance(Protocol):
 
     def seconds_of(self, steps: float) -> float:
         """What so many control steps take (s)."""
+
+
+@runtime_checkable
+class HasAdapter(Protocol):
+    """A task whose champions can be taken to other programs although it turns readings or actions."""
+
+    def adapter(self) -> Adapter:
+        """How readings become what brains sense, and what brains put out becomes controls."""
+
+
+class Camera(Protocol):
+    """Draws what a world was; belongs to one process."""
+
+    def draw(self, snapshot: Any) -> NDArray[np.uint8]:
+        """(height, width, 3) the picture of a `HasPicture.snapshot`."""
+
+
+@runtime_checkable
+class HasPicture(Protocol):
+    """A task whose world can be filmed."""
+
+    def snapshot(self, world: Any) -> Any:
+        """What a picture of the world as it is now needs, as data that other processes can read."""
+
+    def camera(self, width: int, height: int) -> Camera:
+        """Something that makes pictures of snapshots, of so many pixels."""
 
 
 @runtime_checkable

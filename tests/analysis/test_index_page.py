@@ -106,6 +106,23 @@ def test_the_page_says_what_was_run(tmp_path: Path) -> None:
     assert "random actions020" in words
 
 
+def test_of_each_variant_in_each_condition_the_film_of_its_best_run_is_shown_and_no_other(tmp_path: Path) -> None:
+    study = a_study(tmp_path / "runs")
+    filmed = [run for run in study.finished if run.variant == "neat"]
+    for run in filmed:
+        run.directory.plots.mkdir(exist_ok=True)
+        (run.directory.plots / "champion.mp4").write_bytes(b"made up")
+    page = Page(write_index(tmp_path / "report", {"ant": study}, [], {}))
+    best = set()
+    for condition in study.conditions:
+        rivals = [run for run in filmed if run.condition == condition]
+        assert len(rivals) > 1
+        best.add(max(rivals, key=lambda run: study.finished[run].result.validation).directory.plots)  # type: ignore[union-attr]
+    shown = [(tmp_path / "report" / source).resolve() for source in page.values["src"] if source.endswith(".mp4")]
+    assert set(shown) == {plots / "champion.mp4" for plots in best}
+    assert len(shown) == len(best)
+
+
 def test_what_is_missing_stands_there_with_the_command_that_makes_it(tmp_path: Path) -> None:
     words = Page(a_report(tmp_path)).words
     assert "figure-4.2: no finished run" in words

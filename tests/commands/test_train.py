@@ -278,6 +278,8 @@ def shown_settings(command: str) -> list[str]:
         "sweep": ["experiment: null ", "seed: 0 ", "  max_steps: 1000 "],
         "report": ["only: null ", "axis: generation "],
         "evaluate": ["run: null ", "  episodes: 100 ", "  workers: 0 "],
+        "watch": ["run: null ", "panel: null ", "level: null "],
+        "export": ["run: null ", "format: python "],
         "inspect": ["run: null ", "output: outputs "],
         "doctor": ["output: outputs "],
     }

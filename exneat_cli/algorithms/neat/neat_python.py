@@ -5,17 +5,20 @@ Its species, stagnation and reproduction stay in charge. What is reached into, a
 * its random numbers come from Python's global generator, which any thread may draw from: `drawing_from`;
 * its reproduction aborts when species are many, and gives every genome hidden nodes of its own: `SteadyReproduction`;
 * its counters cannot be read: `counter` and `peek`;
-* its configuration is read from an INI file alone: `neat_config`.
+* its configuration is read from an INI file alone: `neat_config`, and `config_text` for one of them.
 """
 
 from __future__ import annotations
 
 import copy
+import dataclasses
 import itertools
 import random
+import tempfile
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import neat
@@ -204,6 +207,23 @@ def neat_config(
         setattr(config.genome_config, name, getattr(settings, name))
     config.genome_config.output_activation = settings.output_activation or settings.activation_default
     return config
+
+
+def config_text(settings: EvolutionSettings, shape: tuple[int, int, int]) -> str:
+    """The configuration as a file of neat-python's, without the settings that are ours alone.
+
+    `shape` is inputs, initial hidden nodes and outputs. The population, which neat-python asks for too, is 100.
+    """
+    ours = {"mutation": "fixed", "crossover_prob": 1.0, "parent_selection": "uniform"}
+    config = neat_config(dataclasses.replace(settings, genome="stock", **ours), 100, shape)  # type: ignore[arg-type]
+    config.reproduction_type = neat.DefaultReproduction
+    config.genome_config.activation_options = sorted(
+        {settings.activation_default, config.genome_config.output_activation}
+    )
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "config.ini"
+        config.save(str(path))
+        return path.read_text("utf-8")
 
 
 def _parsed(kind: Any, settings: EvolutionSettings, names: Iterable[str], **others: object) -> Any:

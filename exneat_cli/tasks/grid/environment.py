@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.tasks import TASKS
+from exneat_cli.tasks.grid.picture import coloured, enlarged
 from exneat_cli.tasks.grid.world import COLUMN, MOVES, ROW, GridTask
 from exneat_cli.tasks.task import RUNNING
 
@@ -102,12 +103,4 @@ def _as_text(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[t
 def _as_picture(
     tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]
 ) -> NDArray[np.uint8]:
-    # Silent tiles are white; channel 1 takes away green and blue (red stays), channel 2 red and green.
-    cues = np.clip(tiles[..., 1:], 0.0, 1.0)
-    colours = np.stack([1.0 - cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - cues[..., 0]], axis=2)
-    colours[tiles[..., 0] == 0] = 0.0
-    for row, column in targets:
-        colours[row, column] = (1.0, 0.85, 0.0)
-    colours[agent] = (0.0, 0.6, 0.2)
-    picture = np.kron(colours, np.ones((PIXELS_PER_TILE, PIXELS_PER_TILE, 1)))
-    return (255 * picture).astype(np.uint8)
+    return enlarged(coloured(tiles, agent, targets), PIXELS_PER_TILE)

@@ -30,7 +30,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from exneat_cli.compiling import compiled, compiled_lean
-from exneat_cli.tasks.task import Part, Task
+from exneat_cli.tasks.grid.picture import GridCamera, Snapshot
+from exneat_cli.tasks.task import Camera, Part, Task
 
 CHANNELS = 2
 STAY = 4
@@ -86,6 +87,14 @@ class GridTask(Task):
     def tiles(self, world: Any) -> NDArray[np.float64]:
         """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
         return np.asarray(np.stack([world.path, *world.signals], axis=2))
+
+    def snapshot(self, world: Any) -> Snapshot:
+        """Tiles, agent and targets as they are now."""
+        return self.tiles(world), (int(world.agent[ROW]), int(world.agent[COLUMN])), self.targets(world)
+
+    def camera(self, width: int, height: int) -> Camera:
+        """Draws tiles, see `exneat_cli.tasks.grid.picture`."""
+        return GridCamera(width, height)
 
     def targets(self, world: Any) -> list[tuple[int, int]]:
         """Row and column of everything that the agent still looks for, to be drawn."""

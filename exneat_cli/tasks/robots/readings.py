@@ -49,6 +49,11 @@ class Readings(NamedTuple):
         return [first + 3 * len(FORCES) * sensed.index(body) for body in bodies if body in sensed]
 
 
+def with_unit(name: str, unit: str) -> str:
+    """A name with its unit in brackets, if it has one."""
+    return f"{name} ({unit})" if unit else name
+
+
 def body_name(model: mujoco.MjModel, body: int) -> str:
     """What a body is called in the names of sensors."""
     return printable(model.body(body).name) or f"body {body}"

@@ -23,9 +23,9 @@ from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real,
 from exneat_cli.tasks.robots import dynamics
 from exneat_cli.tasks.robots.body import SYMMETRIES, Body, check_parts, take_apart
 from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
-from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off
+from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off, with_unit
 from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
-from exneat_cli.tasks.task import Part, Simulation, Task, setting
+from exneat_cli.tasks.task import Adapter, Camera, Part, Simulation, Task, setting
 
 REWARDS = ("thesis", "gymnasium")
 THESIS_CONTROL_WEIGHT = 0.01
@@ -233,6 +233,25 @@ class RobotTask(Task):
         functions = (dynamics.reset, dynamics.rewind, dynamics.observe, dynamics.step, dynamics.locate)
         sense, drive = (dynamics.sense, dynamics.drive) if self.frame == "part" else (None, None)
         return Simulation(world, *functions, sense=sense, drive=drive, owner=(model, data))
+
+    def snapshot(self, world: dynamics.RobotWorld) -> NDArray[np.float64]:
+        """(nq,) the pose."""
+        return world.qpos.copy()
+
+    def camera(self, width: int, height: int) -> Camera:
+        """MuJoCo's renderer, which needs EGL, OSMesa or a screen."""
+        from exneat_cli.tasks.robots.picture import RobotCamera
+
+        return RobotCamera(load(self.model), self._anatomy[0].trunk, width, height)
+
+    def adapter(self) -> Adapter:
+        """Parts' own frames, and the range of the controls."""
+        own = self._sensors_and_actuators(load(self.model))
+        frames = own["frames"] if self.frame == "part" else None
+        signs = np.ones(len(self.actuator_names)) if frames is None else frames.action_signs
+        _, readings, _ = self._anatomy
+        names = tuple(map(with_unit, readings.names, readings.units))
+        return Adapter(names, frames, signs, own["middle"], own["span"], bounded=False)
 
     def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
         """Open `count` worlds on a device, with `room` times the usual room for contacts.

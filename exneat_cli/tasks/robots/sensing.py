@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from exneat_cli.tasks.robots.body import Body, Limb
 from exneat_cli.tasks.robots.frames import VIEW, Frames
 from exneat_cli.tasks.robots.likeness import MIRROR, Pose, relate
-from exneat_cli.tasks.robots.readings import FORCES, Readings, body_name
+from exneat_cli.tasks.robots.readings import FORCES, Readings, body_name, with_unit
 from exneat_cli.tasks.task import Part
 
 
@@ -52,7 +52,7 @@ def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensi
         parts.append(replace(part, is_mirrored=False))
     nothing = np.full((1, len(VIEW)), -1, np.int64)
     frames = _frames(model, body, readings, _Layout(model, readings), np.eye(3)[None], nothing)
-    names = map(_with_unit, readings.names, readings.units)
+    names = map(with_unit, readings.names, readings.units)
     return Sensing(tuple(names), tuple(parts), trunk, frames)
 
 
@@ -66,7 +66,7 @@ class _Layout:
         self.vectors: list[tuple[int, int, int, bool]] = []
 
     def add(self, name: str, unit: str) -> int:
-        self.names.append(_with_unit(name, unit))
+        self.names.append(with_unit(name, unit))
         return len(self.names) - 1
 
     def add_joints(self, joints: Sequence[int], signs: Sequence[int]) -> list[int]:
@@ -211,10 +211,6 @@ def _mirrored_joints(pose: Pose, layout: _Layout, limb: Limb, joints: list[int])
     if image.joints == limb.relation.joints and signs == list(limb.relation.joint_signs):
         return joints
     return layout.add_joints(image.joints, signs)
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} ({unit})" if unit else name
 
 
 def _direction(move: NDArray[np.float64], axis: int, is_pseudo: bool) -> str:

@@ -1,0 +1,37 @@
+"""`exneat export`: the champion of a finished run for use elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.jobs import finished_runs, name_code
+from exneat_cli.errors import ConfigError, check_choice, check_keys, check_section, check_text
+from exneat_cli.records.exports import FORMATS, export
+from exneat_cli.runs import load_champion, load_settings
+
+
+def run(line: CommandLine) -> int:
+    """Write champions in a format of `FORMATS`, each into the folder ``export`` of its run unless told otherwise.
+
+    Raises:
+        ExneatError: a run is unusable, or its champion does not fit the format; nothing was written then.
+    """
+    plain = line.compose_only(("run", "format", "output", "task"))
+    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
+    name_code(line, plain)
+    check_choice("format", plain["format"], list(FORMATS))
+    form, runs = plain["format"], finished_runs(plain["run"])
+    output = plain["output"]
+    if output is not None:
+        check_text("output", output, "a file, or for format=neat a directory")
+        if len(runs) > 1:
+            raise ConfigError("output", "null for several runs, each of which keeps its own", output)
+    loaded = [
+        (directory, settings := load_settings(directory), load_champion(directory, settings)) for directory in runs
+    ]
+    for directory, settings, champion in loaded:
+        place = directory.path / "export" / FORMATS[form] if output is None else Path(output)
+        for path in export(form, champion, settings.task, settings.evolution, place):
+            print(f"Written: {path}")
+    return 0

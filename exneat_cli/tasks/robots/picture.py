@@ -1,0 +1,47 @@
+"""Robots as pictures, by MuJoCo's renderer; a camera follows the trunk."""
+
+from __future__ import annotations
+
+import copy
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+DISTANCE = 2.8
+"""Of the camera, as a multiple of how far the body reaches from its trunk."""
+BODY, PLANAR = (115.0, -22.0), (90.0, -8.0)
+"""Azimuth and elevation in degrees: from behind and above the right side, or straight at the plane; x leads right."""
+
+
+class RobotCamera:
+    """Draws poses of a model.
+
+    Args:
+        model: the body and its surroundings.
+        trunk: the body that is followed.
+        width, height: pixels.
+    """
+
+    def __init__(self, model: mujoco.MjModel, trunk: int, width: int, height: int) -> None:
+        model = copy.copy(model)  # the size of its off-screen pictures is part of a model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._model, self._data, self._trunk = model, mujoco.MjData(model), trunk
+        mujoco.mj_forward(model, self._data)
+        moving = model.geom_bodyid >= trunk
+        away = np.linalg.norm(self._data.geom_xpos - self._data.xpos[trunk], axis=1) + model.geom_rbound
+        is_free = bool((model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any())
+        self._camera = mujoco.MjvCamera()
+        self._camera.distance = DISTANCE * float(away[moving].max())
+        self._camera.azimuth, self._camera.elevation = BODY if is_free else PLANAR
+        self._height = float(self._data.xpos[trunk, 2])
+        self._renderer = mujoco.Renderer(model, height, width)
+
+    def draw(self, snapshot: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """(height, width, 3) of positions, (nq,)."""
+        self._data.qpos[:] = snapshot
+        mujoco.mj_forward(self._model, self._data)
+        # Height stays, so that a hopping body is seen to hop.
+        self._camera.lookat[:] = (*self._data.xpos[self._trunk, :2], 0.8 * self._height)
+        self._renderer.update_scene(self._data, self._camera)
+        return np.asarray(self._renderer.render())

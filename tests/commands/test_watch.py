@@ -1,0 +1,190 @@
+"""`exneat watch`: films that can be decoded, and refusals that leave nothing."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from exneat_cli.commands import watch
+from exneat_cli.errors import ExneatError
+from exneat_cli.main import main
+from exneat_cli.records import VIDEO_FORMATS
+from tests.commands.refusals import check_refusal
+
+FFMPEG = "pip install 'exneat[video]'"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("outputs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+        for settings in (
+            ["task=foraging", "task.steps=9"],
+            ["task=foraging", "task.steps=9", "seed=1"],
+            ["task=foraging", "algorithm=random"],
+            ["task=gym"],
+            ["task=ant", "task.max_steps=12"],
+        ):
+            assert main(["train", "budget=smoke", *settings, f"output={output}"]) == 0
+    return output
+
+
+def run_of(runs: Path, pattern: str) -> Path:
+    return next(iter(sorted(runs.glob(pattern))))
+
+
+def decoded(path: Path) -> list[np.ndarray]:
+    """The frames of a film."""
+    if path.suffix == ".mp4":
+        ffmpeg = pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+        raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+        done = subprocess.run([ffmpeg.get_ffmpeg_exe(), "-i", path, *raw], check=True, capture_output=True)
+        width, height = re.search(rb"Video: .* (\d+)x(\d+)", done.stderr).groups()  # type: ignore[union-attr]
+        return list(np.frombuffer(done.stdout, np.uint8).reshape(-1, int(height), int(width), 3))
+    with Image.open(path) as film:
+        found = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            found.append(np.asarray(film.convert("RGB")))
+        return found
+
+
+@pytest.mark.parametrize("form", ["mp4", "gif", "webp"])
+def test_a_grid_world_plays_in_every_format(form: str, runs: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    assert main(["watch", f"run={run}", f"format={form}", "workers=1", "width=320", "height=240"]) == 0
+    frames = decoded(run / "plots" / f"champion.{form}")
+    assert len(frames) == 9
+    assert frames[0].shape == (240, 640, 3)
+    middle = frames[4].astype(int)
+    assert (np.abs(middle[:, :320] - (0, 153, 51)).max(axis=-1) < 60).sum() > 100, "no agent"
+    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5, "nothing moves"
+    assert [path.name for path in (run / "plots").iterdir() if path.name.startswith(".")] == []
+
+
+def test_runs_stand_side_by_side_without_panels_and_under_noise(runs: Path, tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    noisy = ["sweep=sensor_noise", "level=0.3", "episode=2", "workers=1", "width=160", "height=120"]
+    path = tmp_path / "new" / "both.gif"
+    assert main(["watch", f"run={runs}/foraging/exneat-*", *noisy, f"output={path}", "format=gif"]) == 0
+    assert {frame.shape for frame in decoded(path)} == {(120, 320, 3)}
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    assert main(["watch", f"run={run}", *noisy, "panel=none", "format=gif"]) == 0
+    assert (run / "plots" / "champion-sensor_noise-0.3-episode2.gif").exists()
+
+
+def test_a_robot_is_in_view_and_its_nodes_light_up(runs: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    try:
+        watch.choose_renderer()
+    except ExneatError as error:
+        pytest.skip(str(error))
+    run = run_of(runs, "ant/*")
+    assert main(["watch", f"run={run}", "workers=1"]) == 0
+    frames = decoded(run / "plots" / "champion.mp4")
+    assert len(frames) == 6, "every second step of 12"
+    assert frames[0].shape == (480, 1280, 3)
+    body = frames[3][24:-24, :640].astype(int)
+    brown = (body[..., 0] > body[..., 1] + 20) & (body[..., 1] > body[..., 2])
+    rows, columns = np.nonzero(brown)
+    assert brown.sum() > 2000
+    assert abs(rows.mean() - 216) < 100, "the body is not in the middle"
+    assert abs(columns.mean() - 320) < 150
+    assert (frames[1][:, 640:] != frames[4][:, 640:]).any()
+
+
+def test_training_films_its_champion_once_if_asked_to_and_does_without_where_it_cannot(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    train = ["train", "task=track_maze", "budget=smoke", "video=true", f"output={tmp_path}"]
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "imageio_ffmpeg", None)
+        assert main(train) == 0
+    said = capfd.readouterr().err
+    assert said.count("no video: expected ffmpeg") == 1
+    assert FFMPEG in said
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    assert main(train) == 0
+    (film,) = tmp_path.glob("track_maze/*/plots/champion.mp4")
+    made = film.stat().st_mtime_ns
+    assert len(decoded(film)) > 1
+    assert main(train) == 0
+    assert film.stat().st_mtime_ns == made
+    assert main([*train, "algorithm=random"]) == 0
+    check_refusal([*train, "video=1"], ["video: expected true or false"], tmp_path, capfd)
+
+
+def test_a_film_that_cannot_be_finished_leaves_what_was_there(
+    runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    before = tmp_path / "film.mp4"
+    before.write_bytes(b"before")
+    monkeypatch.setitem(VIDEO_FORMATS, "mp4", {"codec": "none such", "output_params": []})
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    arguments = ["watch", f"run={run}", "workers=1", "width=64", "height=64", f"output={before}"]
+    check_refusal(arguments, ["film.mp4: could not be written"], tmp_path, capfd)
+
+
+BAD = {
+    "format=avi": "format: expected one of mp4, gif, webp, got 'avi'",
+    "panel=all": "panel: expected one of networks, none",
+    "episode=-1": "episode: expected a whole number",
+    "seed=x": "seed: expected a whole number",
+    "level=0.3": "level: expected null without a sweep",
+    "sweep=sensor_noise": "level: expected a level of the sweep",
+    "sweep=reset_noise level=0.1": "sweep: expected a sweep that fits task=foraging",
+    "sweep=sensor_noise level=-1": "noise.sensor_std",
+    "sweep=[p_e,p_c] level=0.1": "sweep: expected one sweep",
+    "width=10": "width: expected a whole number from 64 to 4096",
+    "steps=0": "steps: expected a whole number",
+    "fps=0": "fps: expected a number",
+    "workers=99": "workers: expected a whole number",
+    "foo=1": "foo: unknown key",
+    "output=/proc/self/no/film.mp4": "/proc/self/no",
+}
+
+
+@pytest.mark.parametrize("given", BAD)
+def test_what_makes_no_sense_is_refused(given: str, runs: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    if "output" in given:
+        pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    arguments = ["watch", f"run={run}", "width=64", "height=64", "workers=1", *given.split()]
+    check_refusal(arguments, [BAD[given]], runs, capfd)
+
+
+def test_what_cannot_be_filmed_is_refused(
+    runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    one = run_of(runs, "foraging/exneat-*-s0-*")
+    check_refusal(["watch", f"run={one}"], ["expected ffmpeg", FFMPEG], runs, capfd)
+    monkeypatch.setattr(watch, "check_video_library", lambda: None)
+    old = tmp_path / "old" / one.name
+    shutil.copytree(one, old)
+    (old / "champion.json").write_text((old / "champion.json").read_text().replace('"format": 3', '"format": 2'))
+    for arguments, named in {
+        f"run={run_of(runs, 'foraging/random-*')}": "has no champion: random is a baseline",
+        f"run={run_of(runs, 'gym/*')}": "expected a robot or a grid world, got task=gym",
+        f"run={old}": "expected format 3, got 2: another version of exneat",
+        f"run={runs}/foraging/exneat-*": "output: expected a file, where several runs",
+    }.items():
+        check_refusal(["watch", *arguments.split()], [named], runs, capfd)
+
+    def failing(*arguments: Any, **environment: str) -> str:
+        raise ExneatError("no library")
+
+    monkeypatch.setattr(watch, "said_by", failing)
+    named = ["expected a renderer for MuJoCo, got none", "apt-get install libegl1"]
+    check_refusal(["watch", f"run={run_of(runs, 'ant/*')}"], named, runs, capfd)
