@@ -234,7 +234,8 @@ def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_pat
     for kind in FIGURE_KINDS[:-1]:
         for each in (study, replace(study, variants={"exneat": "ExNEAT", "random": "random actions"})):
             axes, _ = drawn(each, kind)
-            handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))["ExNEAT"]
+            entries = {label[1:]: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+            handles = entries["ExNEAT"]  # after a mark that keeps labels in legends
             colour = handles.get_color() if hasattr(handles, "get_color") else handles.get_facecolor()[0][:3]
             found.add(to_hex(colour))
     assert len(found) == 1

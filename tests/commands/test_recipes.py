@@ -64,10 +64,10 @@ def test_a_recipe_wires_no_modules_where_an_algorithm_has_none(algorithm: str) -
 
 
 def test_what_differs_for_an_algorithm_or_a_geometry_counts_more_than_the_recipe_and_less_than_what_is_given() -> None:
-    assert settings_of().evolution.weight_mutate_power == 0.01
+    assert settings_of().evolution.weight_mutate_power == 0.015
     assert settings_of("algorithm=neat").evolution.weight_mutate_power == 0.005
     four = settings_of("geometry=all")
-    assert (four.evolution.weight_mutate_power, four.pairing) == (0.005, "parents")
+    assert (four.evolution.weight_mutate_power, four.pairing) == (0.01, "parents")
     assert settings_of("geometry=all", "pairing=rank").pairing == "rank"
     assert settings_of("geometry=all", "algorithm=ars").pairing == "rank"
     chosen = settings_of("algorithm=neat", "evolution.weight_mutate_power=0.02").evolution

@@ -32,7 +32,7 @@ def items_of(config: Any) -> dict[str, Any]:
     parts = {name: vars(part) for name, part in vars(config).items() if name.endswith("_config")}
     items = {f"{part}.{name}": value for part, values in parts.items() for name, value in values.items()}
     items |= {name: value for name, value in vars(config).items() if name not in parts}
-    ours = (*_OURS, "output_activation", "generator", "survivors")
+    ours = (*_OURS, "output_activation", "generator", "sensitivity", "survivors")
     objects = ("_params", "activation_defs", "aggregation_defs", "aggregation_function_defs", "config_information")
     return {name: value for name, value in items.items() if name.split(".")[-1] not in (*ours, *objects)}
 
@@ -49,7 +49,7 @@ def test_a_configuration_is_what_neat_python_reads_from_the_file_that_it_saves(t
 
 
 def test_every_setting_reaches_neat_python_under_its_own_name() -> None:
-    ours = ("genome", "neat_hidden", "module_hidden", "output_activation")
+    ours = ("genome", "neat_hidden", "module_hidden", "output_activation", "safe_mutation")
     for settings in COLUMNS.values():
         config = neat_config(settings, 50, (105, 6, 8))
         there = {**vars(config.genome_config), **vars(config.species_set_config)}
