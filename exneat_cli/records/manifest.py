@@ -9,6 +9,10 @@ from msgspec import Meta, Struct
 from exneat_cli.records.plain import Count, Real, Word
 
 MANIFEST_FORMAT = 4
+OLDER_FORMAT = 3
+"""Read too, but not where it tells of `CHANGED_WORLDS`."""
+CHANGED_WORLDS = ("foraging", "hunting")
+"""Tasks in which the same settings meant something else before format 4: p_c was decay, not persistence."""
 RUNNING: Final = "running"
 DONE: Final = "done"
 FAILED: Final = "failed"

@@ -63,8 +63,8 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_representer(str, _Dumper.represent_str)
 
 
-def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[str, Any]]:
-    """Read a JSON object whose field ``format`` is `version`; returns it as the struct `kind`, and as it was.
+def read_json(path: Path, kind: type[_Kind], *versions: int) -> tuple[_Kind, dict[str, Any]]:
+    """Read a JSON object whose field ``format`` is among `versions`; returns it as the struct `kind`, and as it was.
 
     Raises:
         ExneatError: the file is missing, unreadable, no JSON object or of another format, or a field is missing,
@@ -79,9 +79,9 @@ def read_json(path: Path, kind: type[_Kind], version: int) -> tuple[_Kind, dict[
     if not isinstance(content, dict):
         raise ExneatError(f"{path}: expected a JSON object, got {type(content).__name__}")
     came = content.get("format")
-    if came != version or isinstance(came, bool):
+    if came not in versions or isinstance(came, bool):
         why = "another version of exneat wrote it" if came else "exneat did not write it"
-        raise ExneatError(f"{path}: expected format {version}, got {shortened(came)}: {why}")
+        raise ExneatError(f"{path}: expected format {versions[0]}, got {shortened(came)}: {why}")
     return converted(content, kind, f"{path}: damaged"), content
 
 

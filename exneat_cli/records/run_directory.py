@@ -20,7 +20,7 @@ import msgspec
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
-from exneat_cli.records.manifest import DONE, FAILED, MANIFEST_FORMAT, Manifest, Result
+from exneat_cli.records.manifest import CHANGED_WORLDS, DONE, FAILED, MANIFEST_FORMAT, OLDER_FORMAT, Manifest, Result
 from exneat_cli.records.plain import read_json, read_yaml
 
 _NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
@@ -246,7 +246,10 @@ class RunDirectory:
         Raises:
             ExneatError: it is missing, damaged or of another format, or a finished run has no result.
         """
-        manifest, _ = read_json(self.manifest, Manifest, MANIFEST_FORMAT)
+        manifest, _ = read_json(self.manifest, Manifest, MANIFEST_FORMAT, OLDER_FORMAT)
+        if manifest.format == OLDER_FORMAT and manifest.task in CHANGED_WORLDS:
+            why = f"task={manifest.task} was another world then"
+            raise ExneatError(f"{self.manifest}: expected format {MANIFEST_FORMAT}, got {OLDER_FORMAT}: {why}")
         if manifest.status == DONE and manifest.result is None:
             raise ExneatError(f"{self.manifest}: damaged: result: expected the figures of a finished run, got nothing")
         return manifest

@@ -103,9 +103,16 @@ def test_a_run_may_be_made_longer_by_resume_and_never_shorter(tmp_path: Path, st
         claim(run, resume=True, generations=4)
 
 
+def test_a_manifest_of_the_last_format_is_read_where_worlds_are_as_they_were(tmp_path: Path) -> None:
+    run = started(tmp_path / "run", "done")
+    run.manifest.write_text(json.dumps({**json.loads(run.manifest.read_text()), "format": 3, "task": "ant"}))
+    assert run.read_manifest().format == 3
+
+
 @pytest.mark.parametrize(
     ("entries", "named"),
     [
+        ({"format": 3, "task": "hunting"}, "expected format 4, got 3: task=hunting was another world then"),
         ({"format": 2}, "expected format 4, got 2: another version of exneat wrote it"),
         ({"status": "\x1b[31mdone"}, "damaged: status: invalid enum value"),
         ({"wurst": 1}, "damaged: object contains unknown field wurst"),
