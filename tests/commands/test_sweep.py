@@ -51,7 +51,7 @@ def sweep(folder: Path, *arguments: str) -> int:
 
 def plan(folder: Path, *settings: str, name: str = "", budget: str = "smoke") -> list[Job]:
     line = read_command_line("sweep", [f"output={folder / 'out'}", *settings])
-    return plan_jobs(read_experiment(name or str(folder / "small.yaml")), budget, line, ("experiment",))
+    return plan_jobs(read_experiment(name or str(folder / "small.yaml")), budget, line, ("experiment", "publish"))
 
 
 def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing(
