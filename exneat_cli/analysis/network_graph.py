@@ -79,11 +79,7 @@ def champions_figure(title: str, champions: Sequence[Champion], titles: Sequence
 def draw_champion(axes: Axes, champion: Champion, width: float, height: float) -> None:
     """Draw a champion on empty axes, which lose their frame and ticks; text is made to fit their size in inches."""
     boxes, places = layout.lay_out(champion, width, height)
-    used = layout.used_nodes(champion)
-    axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
-    axes.set_axis_off()
-    _draw_links(axes, champion, places, used)
-    _draw_edges(axes, champion, places, used)
+    used = _draw_connections(axes, champion, places, width, height)
     for m, box in enumerate(boxes):
         _draw_box(axes, champion, m, box)
         _draw_nodes(axes, champion, m, places, used)
@@ -93,15 +89,21 @@ def draw_champion(axes: Axes, champion: Champion, width: float, height: float) -
 def draw_still(axes: Axes, champion: Champion, width: float, height: float) -> Places:
     """Draw a champion without its nodes; returns their places, for somebody else to draw them on."""
     boxes, places = layout.lay_out(champion, width, height, named=False)
+    _draw_connections(axes, champion, places, width, height)
+    for m, box in enumerate(boxes):
+        _draw_box(axes, champion, m, box)
+        _name_outputs(axes, champion, m, places)
+    return places
+
+
+def _draw_connections(axes: Axes, champion: Champion, places: Places, width: float, height: float) -> set[Node]:
+    """Empty the axes and draw links and connections; returns the nodes that lead to an actuator."""
     used = layout.used_nodes(champion)
     axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
     axes.set_axis_off()
     _draw_links(axes, champion, places, used)
     _draw_edges(axes, champion, places, used)
-    for m, box in enumerate(boxes):
-        _draw_box(axes, champion, m, box)
-        _name_outputs(axes, champion, m, places)
-    return places
+    return used
 
 
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:

@@ -14,11 +14,11 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from exneat_cli.errors import ExneatError, shortened
+from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import make_directory, read_text
 from exneat_cli.records.plain import Count, Real, Word, converted
 from exneat_cli.records.run_directory import RunDirectory
-from exneat_cli.records.tables import read_robustness, write_csv
+from exneat_cli.records.tables import read_cells, read_robustness, write_csv
 
 
 class PublishedRun(NamedTuple):
@@ -82,8 +82,8 @@ def published_run(
         ExneatError: a file of the run is missing or damaged, or it is not finished.
     """
     condition, variant, budget = place
-    manifest, test = directory.read_manifest(), directory.read_result().champion
-    result, spent = directory.read_result(), manifest.budget_spent
+    manifest, result = directory.read_manifest(), directory.read_result()
+    test, spent = result.champion, manifest.budget_spent
     tested = [
         f"{row.parameter}={row.level!r}:{row.fitness_mean!r}"
         + (f":{row.full_reward_mean!r}" if row.full_reward_mean != row.fitness_mean else "")
@@ -135,15 +135,7 @@ def read_published(path: Path) -> list[PublishedRun]:
     Raises:
         ExneatError: the file is damaged.
     """
-    if not path.exists():
-        return []
-    try:
-        columns, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
-        if tuple(columns) != PublishedRun._fields:
-            raise ValueError(f"the columns {shortened(columns)}")
-    except (csv.Error, ValueError) as error:
-        raise ExneatError(f"{path}: expected a table of {', '.join(PublishedRun._fields)}, got {error}") from error
-    cells = [[cell or None for cell in row] for row in rows]
+    cells = [[cell or None for cell in row] for row in read_cells(path, PublishedRun._fields)]
     return converted(cells, list[PublishedRun], f"{path}: damaged, at [row][column]", strict=False)
 
 

@@ -72,15 +72,25 @@ def read_robustness(path: Path) -> list[RobustnessRow]:
     Raises:
         ExneatError: the file is damaged.
     """
+    rows = read_cells(path, RobustnessRow._fields)
+    return converted(rows, list[RobustnessRow], f"{path}: damaged, at [row][column]", strict=False)
+
+
+def read_cells(path: Path, fields: Sequence[str]) -> list[list[str]]:
+    """The text of all rows below a heading of these columns; none if the file is not there.
+
+    Raises:
+        ExneatError: the file cannot be read, or has other columns.
+    """
     if not path.exists():
         return []
     try:
         columns, *rows = csv.reader(io.StringIO(read_text(path), newline=""))
-        if tuple(columns) != RobustnessRow._fields:
+        if tuple(columns) != tuple(fields):
             raise ValueError(f"the columns {shortened(columns)}")
     except (csv.Error, ValueError) as error:
-        raise ExneatError(f"{path}: expected a table of {', '.join(RobustnessRow._fields)}, got {error}") from error
-    return converted(rows, list[RobustnessRow], f"{path}: damaged, at [row][column]", strict=False)
+        raise ExneatError(f"{path}: expected a table of {', '.join(fields)}, got {error}") from error
+    return rows
 
 
 def merge_robustness(path: Path, rows: Sequence[RobustnessRow]) -> None:
