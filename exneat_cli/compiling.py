@@ -13,14 +13,15 @@ import functools
 import hashlib
 import os
 import sys
+import time
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import config
+from numba.core import config, event
 from numba.core.caching import FunctionCache
 
 _COMPILED_ROOMS = ("tasks", "algorithms", "brains", "rollouts")
@@ -134,3 +135,44 @@ def with_functions(template: Callable[..., Any], name: str, **functions: Callabl
     copy = types.FunctionType(template.__code__, {**template.__globals__, **functions}, name)
     copy.__qualname__ = name
     return copy
+
+
+class _Compilations(event.Listener):  # type: ignore[misc]
+    """What this process compiles; numba tells it under a lock of its own, and of compilations within others too."""
+
+    def __init__(self) -> None:
+        self.listeners: list[Callable[[bool], None]] = []
+        self.spent, self._depth, self._began = 0.0, 0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        """Begin to count, and say whether the result will be cached."""
+        self._depth += 1
+        if self._depth == 1:
+            self._began = time.perf_counter()
+            for tell in tuple(self.listeners):
+                tell(isinstance(event.data["dispatcher"]._cache, _Cache))
+
+    def on_end(self, event: Any) -> None:
+        """Count to here."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.spent += time.perf_counter() - self._began
+
+
+_compilations = _Compilations()
+event.register("numba:compile", _compilations)
+
+
+def seconds_compiled() -> float:
+    """How long this process has compiled so far (s)."""
+    return _compilations.spent
+
+
+@contextlib.contextmanager
+def announcing(tell: Callable[[bool], None]) -> Iterator[None]:
+    """Call `tell` before anything is compiled in this block, with whether that will be cached for other processes."""
+    _compilations.listeners.append(tell)
+    try:
+        yield
+    finally:
+        _compilations.listeners.remove(tell)

@@ -79,7 +79,8 @@ def check_flag(key: str, value: object) -> None:
 def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
     """Refuse anything but one of `choices` with a `ConfigError`."""
     if not isinstance(value, str) or value not in choices:
-        raise ConfigError(key, "one of " + ", ".join(choices), value)
+        close = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
+        raise ConfigError(key, "one of " + ", ".join(choices), value, f"did you mean {close[0]}?" if close else "")
 
 
 def check_text(key: str, value: object, expected: str = "text") -> None:

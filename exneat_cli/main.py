@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -15,6 +17,7 @@ from exneat_cli.output import NO_ROOM, forgiving_output
 
 COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
+    "resume": "go on with an unfinished run, or make a finished one longer",
     "sweep": "train all variants of an experiment and test how they hold up",
     "evaluate": "test finished runs under perturbations",
     "watch": "film a run's champion, its networks beside it",
@@ -25,8 +28,8 @@ COMMANDS = {
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
-_RESUMABLE = "exneat: interrupted; run the same command again to resume (a single exneat train also needs resume=true)"
-_MAKING_FILES = ("train", "sweep", "evaluate", "report")
+_RESUMABLE = "exneat: interrupted; to go on:"
+_MAKING_FILES = ("train", "resume", "sweep", "evaluate", "report")
 """What these say is no result, and may get lost."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
@@ -42,6 +45,7 @@ usage: exneat <command> [key=value ...]
   exneat train --cfg job task=hunting           what these settings come to, without training
   exneat train --config-dir mine task=own       mine/task/own.yaml is a task of your own
   exneat train task=custom task.kind=my_module:MyTask   and so is this class
+  exneat resume run=outputs/ant/<run>           go on with what was interrupted
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
   exneat watch run=outputs/ant/<run>            a film of the champion
@@ -69,7 +73,7 @@ def program() -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default the process's own; returns its exit code.
 
-    0 is done, 1 a failed job or an unfit machine, 2 refused, 130 or 143 interrupted.
+    0 is done, 1 a failed job or an unfit machine, 2 refused, 128 and a signal's number interrupted.
     """
     command, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     if command in ("-h", "--help", "help"):
@@ -85,14 +89,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if command != "doctor" and os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
                 raise ExneatError("NUMBA_DISABLE_JIT: expected 0, got 1: without compiled code nothing runs; unset it")
             if command not in COMMANDS:
-                raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; see exneat --help")
+                close = difflib.get_close_matches(command, COMMANDS, n=1)
+                hint = f"did you mean {close[0]}?" if close else "see exneat --help"
+                raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; {hint}")
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
             if line.shown:
                 print(line.show())
                 return 0
             return int(importlib.import_module(f"exneat_cli.commands.{command}").run(line))
         except (Exception, KeyboardInterrupt) as error:
-            return _ended_by(error)
+            return _ended_by(error, shlex.join(["exneat", command, *rest]))
 
 
 def _check_place() -> None:
@@ -104,10 +110,13 @@ def _check_place() -> None:
         raise ExneatError(f"{why}\n  it may have been removed; change to one that is there") from error
 
 
-def _ended_by(error: BaseException) -> int:
-    """Say what ended a command, where that is no fault of the program's; returns the exit code."""
+def _ended_by(error: BaseException, typed: str) -> int:
+    """Say what ended a command, where that is no fault of the program's; returns the exit code.
+
+    A command may note how to go on with an error; else it is what was typed.
+    """
     if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
-        print(_RESUMABLE, file=sys.stderr, flush=True)
+        print(_RESUMABLE, getattr(error, "__notes__", [typed])[-1], sep="\n", file=sys.stderr, flush=True)
         return 128 + (signal_heard() or signal.SIGINT)
     if isinstance(error, ExneatError):
         message = str(error)

@@ -168,8 +168,7 @@ def test_whatever_error_comes_after_a_signal_is_the_interruption(
 
     monkeypatch.setattr("exneat_cli.main.importlib.import_module", interrupted)
     assert main(["report"]) == 143
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("exneat: interrupted; run the same command again to resume")
+    assert capsys.readouterr().err.splitlines() == ["exneat: interrupted; to go on:", "exneat report"]
 
 
 def test_a_program_that_is_done_ends_with_its_own_exit_code_whatever_comes_late() -> None:

@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.network_graph import draw_still
 from exneat_cli.analysis.network_layout import Node
-from exneat_cli.records import Champion
+from exneat_cli.records.champion import Champion
 
 Pixels = NDArray[np.uint8]
 DPI, NATURAL = 100, 640

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_hex, to_rgb, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch
@@ -21,7 +21,8 @@ from exneat_cli.analysis import network_layout as layout
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.network_layout import Node, Places
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory, read_champion
+from exneat_cli.records import RunDirectory
+from exneat_cli.records.champion import Champion, read_champion
 
 POSITIVE, NEGATIVE = styles.BLUE, styles.VERMILION
 MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles.OLIVE, styles.BLACK)
@@ -44,7 +45,7 @@ def draw_network(run: RunDirectory) -> list[Path]:
         ExneatError: the run has no champion, or its file is damaged.
     """
     champion = champion_of(run)
-    title = f"{run.path.name}: champion, test fitness {champion.scores.test.fitness_mean:.4g}"
+    title = f"{styles.run_title(run)}: champion, test fitness {champion.scores.test.fitness_mean:.4g}"
     return styles.save_figure(champions_figure(title, [champion]), run.plots / "network")
 
 
@@ -132,7 +133,11 @@ def _dot(face: str, **look: Any) -> styles.Look:
 
 
 def _colour(m: int) -> str:
-    return MODULE_COLOURS[m % len(MODULE_COLOURS)]
+    """A colour of its own for every module: beyond `MODULE_COLOURS` the same ones, each time halfway nearer to grey."""
+    turn, k = divmod(m, len(MODULE_COLOURS))
+    share = 0.5**turn
+    red, green, blue = (share * own + (1.0 - share) * 0.75 for own in to_rgb(MODULE_COLOURS[k]))
+    return str(to_hex((red, green, blue)))
 
 
 def _draw_box(axes: Axes, champion: Champion, m: int, box: Bbox) -> None:

@@ -8,7 +8,7 @@ from itertools import groupby
 import numpy as np
 from matplotlib.transforms import Bbox
 
-from exneat_cli.records import Champion
+from exneat_cli.records.champion import Champion
 from exneat_cli.wiring import Module
 
 Node = tuple[int, int]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exneat_cli.analysis import styles
@@ -41,17 +42,21 @@ def draw_training(run: RunDirectory, fitness_name: str, tested: float | None = N
                 axes.plot(history["generation"], history[column], **look)
         if tested is not None:
             axes.axhline(tested, **_TESTED)
-        axes.set(title=run.path.name, xlabel="generation", ylabel=f"training fitness ({fitness_name})")
+        score = "training fitness" if fitness_name == "fitness" else f"training fitness ({fitness_name})"
+        axes.set(title=styles.run_title(run), xlabel="generation", ylabel=score)
         styles.tick_levels(axes, history["generation"])
-        axes.legend(loc="upper left")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return styles.save_figure(figure, run.plots / "training")
 
 
-def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: str) -> list[Path]:
+def draw_robustness(
+    run: RunDirectory, labels: Mapping[str, str], fitness_name: str, trained: Mapping[str, float] | None = None
+) -> list[Path]:
     """Draw fitness at each level of each sweep in a run's robustness.csv, as PNG and SVG; no files without a sweep.
 
     Of a level that was tested more than once, the row with the most episodes is shown. `labels` are those of the axes
-    by the sweeps' names, which stand in where there is none; `fitness_name` is that of the vertical axes.
+    by the sweeps' names, which stand in where there is none; `fitness_name` is that of the vertical axes, and
+    `trained` holds the level of training by the sweeps' names.
     """
     tested = [row for row in read_robustness(run.robustness) if row.parameter != UNPERTURBED]
     rows = pd.DataFrame(tested, columns=RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
@@ -69,12 +74,16 @@ def draw_robustness(run: RunDirectory, labels: Mapping[str, str], fitness_name: 
             x, mean, spread = levels["level"], levels["fitness_mean"], levels["fitness_std"]
             axes.fill_between(x, mean - spread, mean + spread, color=styles.BLUE, alpha=0.18, linewidth=0.0, label=band)
             axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
+            if trained and sweep in trained:
+                axes.axvline(
+                    trained[str(sweep)], color=styles.GREY, linestyle=":", linewidth=1.2, label="as in training"
+                )
             styles.tick_levels(axes, x)
             axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
         for axes in panels[len(sweeps) :]:
             axes.remove()
-        figure.suptitle(f"{run.path.name}: robustness")
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        figure.suptitle(f"{styles.run_title(run)}: robustness")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return styles.save_figure(figure, run.plots / "robustness")
 
 
@@ -85,7 +94,7 @@ def draw_path(run: RunDirectory) -> list[Path]:
     coloured by time. Where a task tells no place: its reward terms over time.
     """
     trace = read_csv(run.trace)
-    title = f"{run.path.name}: first test episode"
+    title = f"{styles.run_title(run)}: first test episode"
     with styles.style():
         if run.tiles.exists():
             figure = _on_tiles(trace, read_csv(run.tiles))
@@ -109,24 +118,34 @@ def draw_path(run: RunDirectory) -> list[Path]:
 
 
 def _on_tiles(trace: pd.DataFrame, tiles: pd.DataFrame) -> Figure:
-    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     grid = tiles.pivot(index="row", columns="column")
-    prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
-    for channel, axes in enumerate(figure.subplots(1, 2), start=1):
-        cues = np.ma.masked_where(grid["path"] == 0, grid[f"channel_{channel}"])
-        picture = axes.imshow(cues, cmap="YlOrBr", vmin=0.0)
-        for name in prey[:MOST_PREY]:
-            row, column, is_free = trace[f"{name}_row"], trace[f"{name}_column"], trace[f"{name}_free"] == 1
-            axes.plot(column[is_free], row[is_free], "-", color=styles.GREEN, linewidth=1.0)
-            end = min(is_free.sum(), len(trace) - 1)
-            axes.plot(column.iloc[end], row.iloc[end], "." if is_free.all() else "x", color=styles.GREEN)
+    channels = [np.ma.masked_where(grid["path"] == 0, grid[f"channel_{channel}"]) for channel in (1, 2)]
+    strongest = max(float(cues.max()) for cues in channels)  # one scale for both
+    panels = figure.subplots(1, 2)
+    for channel, (axes, cues) in enumerate(zip(panels, channels, strict=True), start=1):
+        picture = axes.imshow(cues, cmap="YlOrBr", vmin=0.0, vmax=strongest)
+        _draw_prey(axes, trace)
         if "goal_row" in trace:
-            axes.plot(trace["goal_column"].iloc[0], trace["goal_row"].iloc[0], "*", color=styles.GREEN, markersize=12)
-        axes.plot(trace["column"], trace["row"], "-", color=styles.BLUE, linewidth=2.0)
+            x, y = trace["goal_column"].iloc[0], trace["goal_row"].iloc[0]
+            axes.plot(x, y, "*", color=styles.GREEN, markersize=12, label="goal")
+        axes.plot(trace["column"], trace["row"], "-", color=styles.BLUE, linewidth=2.0, label="agent")
         for place, marker, label in ((0, "o", "start"), (-1, "s", "end")):
             axes.plot(trace["column"].iloc[place], trace["row"].iloc[place], marker, color=styles.BLUE, label=label)
         axes.set(title=f"channel {channel}", xticks=[], yticks=[], facecolor=styles.GREY)
         axes.grid(visible=False)
-        figure.colorbar(picture, ax=axes, shrink=0.8, label="cue at the end")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.colorbar(picture, ax=panels, shrink=0.8, label="cue at the end")
+    entries = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=len(entries))
     return figure
+
+
+def _draw_prey(axes: Axes, trace: pd.DataFrame) -> None:
+    """Draw where prey went, and where it was caught or left."""
+    prey = [name.removesuffix("_free") for name in trace.columns if name.endswith("_free")]
+    for name in prey[:MOST_PREY]:
+        row, column, is_free = trace[f"{name}_row"], trace[f"{name}_column"], trace[f"{name}_free"] == 1
+        axes.plot(column[is_free], row[is_free], "-", color=styles.GREEN, linewidth=1.0, label="prey")
+        end = min(is_free.sum(), len(trace) - 1)
+        marker, label = (".", "prey, free at the end") if is_free.all() else ("x", "prey, caught here")
+        axes.plot(column.iloc[end], row.iloc[end], marker, linestyle="", color=styles.GREEN, label=label)

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.records import make_directory, write_whole
+from exneat_cli.records import RunDirectory, make_directory, write_whole
 
 Look = dict[str, Any]
 """Matplotlib's keywords for the line of a variant's mean: ``color``, ``marker``, ``linestyle`` and others."""
@@ -89,6 +89,14 @@ def _chosen(names: Sequence[str], known: Mapping[str, Look], others: Sequence[Lo
 def style() -> AbstractContextManager[None]:
     """Context in which figures are made and saved; a matplotlibrc of the user's own does not count there."""
     return matplotlib.style.context(_STYLE, after_reset=True)
+
+
+def run_title(run: RunDirectory) -> str:
+    """Say what a run is, e.g. ``hunting, exneat-all-none, seed 3``: the hash in its name tells nobody anything."""
+    name, _, digest = run.path.name.rpartition("-")
+    variant, _, seed = name.rpartition("-s")
+    is_usual = bool(variant) and seed.isdigit() and len(digest) == 6
+    return f"{run.path.parent.name}, {variant}, seed {seed}" if is_usual else run.path.name
 
 
 def tick_levels(axes: Axes, levels: Iterable[float]) -> None:

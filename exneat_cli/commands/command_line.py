@@ -114,20 +114,33 @@ class CommandLine:
         }
 
     def show(self) -> str:
-        """What is asked for with ``--cfg job``: the composition as YAML; with ``--help``: the files it comes from."""
+        """What is asked for with ``--cfg job``: the composition as YAML; with ``--help``: every key."""
         if self.shown == "job":
             from exneat_cli.records import as_yaml  # takes longer to import than --help to answer
 
             return as_yaml(self.compose()).rstrip()
+        from exneat_cli.commands.help_text import help_text
+
         with self.composed() as config:
             choices = dict(reversed(config.hydra.runtime.choices.items()))
-        files = {str(self.primary): "", **({"config": ""} if "task" in choices else {})}
-        files |= {f"{group}/{option}": f"# {group}={option}\n" for group, option in choices.items()}
-        texts = []
-        for name, title in files.items():
-            paths = [path for directory in self.directories if (path := directory / f"{name}.yaml").exists()]
-            texts += [title + path.read_text("utf-8").removeprefix("# @package _global_\n") for path in paths[:1]]
-        return "\n".join(texts).rstrip()
+            plain = {str(key): _shown(config, str(key)) for key in config if key != "hydra"}
+        names = [str(self.primary), *(["config"] if "task" in choices else [])]
+        names += [f"{group}/{option}" for group, option in choices.items()]
+        files = []
+        for name in dict.fromkeys(names):
+            for path in [path for folder in self.directories if (path := folder / f"{name}.yaml").exists()][:1]:
+                is_global = "/" not in name or path.read_text("utf-8").startswith("# @package _global_")
+                files.append(("" if is_global else name.partition("/")[0], path))
+        return help_text(self.words[1], files, plain, choices)
+
+
+def _shown(config: DictConfig, key: str) -> Any:
+    """A value as it comes out, or as it is written where it refers to what is not chosen yet."""
+    try:
+        value = config[key]
+        return OmegaConf.to_container(value, resolve=True) if OmegaConf.is_config(value) else value
+    except OmegaConfBaseException:
+        return OmegaConf.to_container(config, resolve=False)[key]  # type: ignore[call-overload, index]
 
 
 def _check_there(plain: Mapping[str, Any], keys: Sequence[str]) -> None:
@@ -281,6 +294,8 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
         known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
+        if close := difflib.get_close_matches(option, files or error.options or (), n=1):
+            known += f"\n  did you mean {close[0]}?"
         if group == "task":
             return f"{known}\n  a class of your own goes by task=custom task.kind=package.module:Class"
         return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known

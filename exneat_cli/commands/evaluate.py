@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import finished_runs, name_code, with_sweeps
+from exneat_cli.commands.jobs import Job, finished_runs, name_code, with_sweeps
+from exneat_cli.commands.run_table import print_table
 from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
-from exneat_cli.records import build
+from exneat_cli.records import RunDirectory, build, read_robustness
 from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
 
@@ -35,4 +36,15 @@ def run(line: CommandLine) -> int:
         tested = job.test(directory, executor, progress_for_terminal())
         came = f"{directory.robustness}: {tested} levels tested now"
         print(came if tested else f"{directory.path}: all there already")
+        _print_levels(job, directory)
     return 0
+
+
+def _print_levels(job: Job, directory: RunDirectory) -> None:
+    """Print what the run reached at each level that was asked for, with the label and unit of each sweep."""
+    rows = {(row.parameter, row.level, row.episodes): row for row in read_robustness(directory.robustness)}
+    for sweep in job.sweeps:
+        reached = [rows[sweep.name, float(level), job.episodes] for level in sweep.levels]
+        cells = [[f"{row.level:g}", f"{row.fitness_mean:.4g}", f"{row.fitness_std:.3g}"] for row in reached]
+        print(f"\n{sweep.label or sweep.name}; {job.settings.task.fitness_name} over {job.episodes} episodes")
+        print_table([["level", "mean", "sd"], *cells], numbers=(0, 1, 2))

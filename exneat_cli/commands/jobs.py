@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import glob
+import shlex
 import sys
 import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.command_line import CommandLine, as_written
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_keys, check_path, check_section
 from exneat_cli.records import RunDirectory, runs_at
 from exneat_cli.rollouts import Executor, Sweep
@@ -67,6 +68,14 @@ class Job:
             why = str(error).splitlines()
             print(f"exneat: {directory.path.name}: no video: {'; '.join(map(str.strip, why))}", file=sys.stderr)
 
+    def resuming(self, words: Sequence[str]) -> str:
+        """The command that goes on with the run, ready to paste; a user's own task is named as in the `words` typed."""
+        path = str(self.settings.directory.path)
+        is_plain = all(character.isalnum() or character in "/._-" for character in path)
+        typed = [word for word in words if word.startswith(("task.kind=", "task.env_id=", "sweep=", "sweep.levels="))]
+        episodes = [f"sweep.episodes={self.episodes}"] if self.sweeps else []
+        return shlex.join(["exneat", "resume", f"run={path if is_plain else as_written(path)}", *typed, *episodes])
+
     def test(self, directory: RunDirectory, executor: Executor, progress: Progress) -> int:
         """Test the finished run at the levels that are missing, and draw the figures that are; returns how many levels.
 
@@ -105,11 +114,20 @@ class Job:
             "training": lambda: draw_training(directory, fitness, directory.read_result().champion.fitness_mean),
             "path": lambda: draw_path(directory),
             "network": lambda: draw_network(directory),
-            "robustness": lambda: draw_robustness(directory, labels, fitness),
+            "robustness": lambda: draw_robustness(directory, labels, fitness, self._trained_levels()),
         }
         with directory.held():  # nobody may change the data between reading and drawing
             for name in self.missing_figures(directory):
                 draw[name]()
+
+    def _trained_levels(self) -> dict[str, float]:
+        """What the setting of each sweep was in training, where that is one number."""
+        plain, levels = self.settings.to_plain(), {}
+        for sweep in self.sweeps:
+            section, _, key = sweep.parameter.partition(".")
+            if isinstance(value := plain[section].get(key), int | float):
+                levels[sweep.name] = float(value)
+        return levels
 
 
 def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
@@ -132,6 +150,11 @@ def finished_runs(pattern: object) -> list[RunDirectory]:
     raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
 
 
+def check_known(plain: Mapping[str, Any], others: Sequence[str] = ()) -> None:
+    """Refuse keys that are neither a run's nor among `others` with an `ExneatError`."""
+    check_keys("", plain, (*_SETTINGS, "recipe", "budget", "budgets", "sweep", "sweeps", "video", *others))
+
+
 def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
     """Compose the settings of a run, beside which `others` may be set, check them, and make a job of them.
 
@@ -140,7 +163,7 @@ def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
     """
     plain = line.compose()
     name_code(line, plain)
-    check_keys("", plain, (*_SETTINGS, "recipe", "budget", "budgets", "sweep", "sweeps", "video", *others))
+    check_known(plain, others)
     check_flag("video", plain.get("video", False))
     for budget, spent in check_section("budgets", plain.get("budgets", {})).items():
         check_choice(f"budgets.{budget}", budget, BUDGETS)

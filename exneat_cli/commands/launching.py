@@ -56,7 +56,7 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
         with keep_workers():  # starting one takes seconds
             here = functools.partial(_do, work, jobs, None)
             numbers = [{"job": k} for k in range(len(jobs))]
-            if all(job.settings.executor.name == "warp" for job in jobs):
+            if side_by_side(jobs):
                 # Their episodes share batches of worlds, which one run alone would not fill.
                 with ThreadPoolExecutor(MOST_SIDE_BY_SIDE, thread_name_prefix="run") as pool:
                     return list(pool.map(here, numbers))
@@ -66,6 +66,11 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
         here = functools.partial(_do_here, Path.cwd(), known, functools.partial(_do, work, jobs, workplace))
         with _importable():
             return _launch(here, len(jobs), line, workplace)
+
+
+def side_by_side(jobs: Sequence[Job]) -> bool:
+    """Whether jobs that no launcher does run together here."""
+    return all(job.settings.executor.name == "warp" for job in jobs)
 
 
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:

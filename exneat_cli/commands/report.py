@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from exneat_cli.commands.command_line import CommandLine, shipped_directory
 from exneat_cli.commands.jobs import BUDGETS
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ExneatError, check_choice, check_path
-from exneat_cli.records import PublishedRun, RunDirectory, read_published
+from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis")
@@ -43,10 +44,17 @@ def run(line: CommandLine) -> int:
         name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
     }
     commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
-    lacking = ExneatError(f"output={asked['output']}: no finished run of {', '.join(names)}\n  {commands[names[0]]}")
+    lacking = ExneatError(
+        f"output={asked['output']}: no finished run of {', '.join(names)}\n  "
+        + (_own_experiments(asked, sources) or commands[names[0]])
+    )
     if not any(_has_any(experiments[name], budgets[name], asked["output"], rows[name]) for name in names):
-        plan_jobs(experiments[names[0]], budgets[names[0]], line, _OWN)  # refuses settings that make no sense
-        raise lacking  # planning all of them takes ten seconds
+        first = experiments[names[0]]  # planning all of them takes ten seconds
+        one = replace(
+            first, conditions=dict([*first.conditions.items()][:1]), variants=dict([*first.variants.items()][:1])
+        )
+        plan_jobs(one, budgets[names[0]], line, _OWN)  # refuses settings that make no sense
+        raise lacking
     studies = {name: study_of(experiments[name], budgets[name], commands[name], line, rows[name]) for name in names}
     if not any(study.reached for study in studies.values()):
         raise lacking
@@ -138,6 +146,21 @@ def study_of(
         sweep_episodes=swept[0].episodes if swept else None,
         rows=tuple(rows),
     )
+
+
+def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> str:
+    """The commands that report on what other experiments the runs are of; empty if there are none."""
+    found: dict[str, None] = {}
+    for run in find_runs(Path(asked["output"])):
+        try:
+            words = run.read_manifest().command
+        except ExneatError:
+            continue
+        found |= dict.fromkeys(word for word in words if word.startswith("experiment="))
+    others = [word for word in found if word.partition("=")[2] not in map(str, sources.values())]
+    places = [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
+    reports = " or ".join(shlex.join(["exneat", "report", word, *places]) for word in others[:3])
+    return f"there are runs of another experiment: {reports}" if reports else ""
 
 
 def _largest_budget(experiment: Experiment, output: str, rows: Sequence[PublishedRun]) -> str:

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import sys
-import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
-from exneat_cli.commands.jobs import BUDGETS, Job, read_job
-from exneat_cli.commands.launching import run_jobs
+from exneat_cli.commands.jobs import BUDGETS, Job, check_known, read_job
 from exneat_cli.commands.publishing import Publisher
+from exneat_cli.commands.run_table import print_table
+from exneat_cli.commands.series import do_jobs, unfinished
 from exneat_cli.errors import (
     ConfigError,
     ExneatError,
@@ -33,7 +33,6 @@ from exneat_cli.errors import (
 )
 from exneat_cli.interruption import signal_heard
 from exneat_cli.records import DONE, build
-from exneat_cli.runs import Progress, progress_for_terminal
 from exneat_cli.tasks.contract import check_worlds
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
@@ -49,7 +48,7 @@ class Variant:
     """
 
     label: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
     runs: int | None = None
     swept: bool = True
     against: str | None = None
@@ -60,11 +59,11 @@ class Condition:
     """One training condition, and the robustness sweeps that the runs of all variants but unswept ones go through."""
 
     label: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
     sweeps: list[str] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Experiment:
     """What experiments/<name>.yaml says; its first variant is the one that the others are compared with.
 
@@ -73,7 +72,7 @@ class Experiment:
 
     name: str
     claim: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
     variants: Mapping[str, Variant]
     conditions: Mapping[str, Condition]
     runs: Mapping[str, int]
@@ -228,6 +227,7 @@ def run(line: CommandLine) -> int:
     """
     asked = line.compose("experiment", "budget", "publish")
     if not asked["experiment"]:
+        check_known(line.compose(), ("experiment", "publish"))  # it may be misspelt
         raise ConfigError("experiment", "a name or a YAML file, e.g. experiment=track_maze", asked["experiment"])
     check_flag("publish", asked["publish"])
     experiment = read_experiment(asked["experiment"])
@@ -237,7 +237,7 @@ def run(line: CommandLine) -> int:
         file, names = results_file(asked["experiment"]), (tuple(experiment.conditions), tuple(experiment.variants))
         publisher = Publisher(file, asked["budget"], *names)
         publisher.publish([job for job in jobs if job.is_finished()])
-    pending = [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
+    pending = unfinished(jobs)
     for job in pending:
         check_worlds(job.settings.task)
     before = len(jobs) - len(pending)
@@ -245,8 +245,7 @@ def run(line: CommandLine) -> int:
     print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
     reasons = [""] * len(pending)
     try:
-        if pending:
-            reasons = run_jobs(functools.partial(_do, jobs, len(pending), time.time(), line, publisher), pending, line)
+        reasons = do_jobs(jobs, pending, line, publisher)
     except ExneatError as error:
         if signal_heard() is not None or not any(job.is_finished() for job in pending):
             raise
@@ -255,6 +254,7 @@ def run(line: CommandLine) -> int:
     reasons = [reason or _unfinished_because(job) for job, reason in zip(pending, reasons, strict=True)]
     failed = {job.name: reason for job, reason in zip(pending, reasons, strict=True) if reason}
     done = len(pending) - len(failed)
+    _print_means(jobs)
     print(f"\n{experiment.name}: {done} runs done, {before} skipped as finished before, {len(failed)} failed")
     for name, reason in failed.items():
         print(f"  {name}: {reason}", file=sys.stderr)
@@ -263,23 +263,17 @@ def run(line: CommandLine) -> int:
     return 1 if failed else 0
 
 
-def _do(
-    jobs: Sequence[Job], pending: int, began: float, line: CommandLine, publisher: Publisher | None, job: Job
-) -> None:
-    """Do one job, publish it if that is asked for, and tell how far the sweep is."""
-    started = time.time()
-    shown = sys.stderr.isatty() and not line.launcher
-    finished = job.do(progress_for_terminal() if shown else Progress(), line.words, go_on=True)
-    if publisher:
-        publisher.publish([job])
-    left = sum(not each.is_finished() for each in jobs)
-    seconds = (time.time() - began) / max(1, pending - left) * left
-    when = f"about {seconds / 60:.0f} min" if seconds >= 90 else f"about {seconds:.0f} s"
-    task = job.settings.task
-    fitness = f"{task.fitness_name} {finished.result.champion.fitness_mean:.{task.fitness_decimals}f}"
-    counted = f"[{len(jobs) - left:>{len(str(len(jobs)))}}/{len(jobs)}]"
-    took = f"in {time.time() - started:.1f} s" + (f", {when} left" if left else "")
-    print(f"{counted} {job.name}: {fitness} {took}", flush=True)
+def _print_means(jobs: Sequence[Job]) -> None:
+    """Print what the variants reached, over their finished runs."""
+    reached: dict[str, list[float]] = {}
+    for job in jobs:
+        if job.is_finished():
+            result = job.settings.directory.read_result()
+            reached.setdefault(job.name.rpartition("/")[0], []).append(result.champion.fitness_mean)
+    if reached:
+        print()
+        rows = [[name, str(len(runs)), f"{np.mean(runs):.4g}", f"{np.std(runs):.3g}"] for name, runs in reached.items()]
+        print_table([["condition/variant", "runs", "test fitness", "sd over runs"], *rows], numbers=(1, 2, 3))
 
 
 def _unfinished_because(job: Job) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import sys
-from collections.abc import Sequence
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import Job, read_job
-from exneat_cli.commands.launching import run_jobs
+from exneat_cli.commands.jobs import read_job
+from exneat_cli.commands.run_table import ListedRun, print_runs, sorted_runs
+from exneat_cli.commands.series import do_jobs, unfinished
 from exneat_cli.errors import ExneatError
 from exneat_cli.runs import Finished, progress_for_terminal
 from exneat_cli.tasks.contract import check_worlds
@@ -22,7 +21,13 @@ def run(line: CommandLine) -> int:
     """
     if not line.multirun and not line.launcher:
         job = read_job("train", line)
-        _tell(job.do(progress_for_terminal(), line.words, go_on=False))
+        try:
+            finished = job.do(progress_for_terminal(), line.words, go_on=False)
+        except (Exception, KeyboardInterrupt) as error:
+            if job.settings.directory.is_there():
+                error.add_note(job.resuming(line.words))
+            raise
+        tell(finished)
         return 0
     jobs, failures = [], []
     for name, each in line.combinations().items():
@@ -33,19 +38,22 @@ def run(line: CommandLine) -> int:
         except ExneatError as error:
             failures.append(str(error))
             print(f"exneat: {name or 'train'}: {error}", file=sys.stderr)
-    work = functools.partial(_train, line.words, go_on=line.multirun)
-    failures += filter(None, run_jobs(work, jobs, line) if jobs else [])
+    pending = unfinished(jobs)
+    if not line.launcher:
+        print(f"{len(jobs)} runs, {len(jobs) - len(pending)} of them finished before", flush=True)
+    failures += filter(None, do_jobs(jobs, pending, line))
+    listed = [ListedRun.read(run) for job in jobs if (run := job.settings.directory).is_there()]
+    if listed:
+        print()
+        print_runs(sorted_runs(listed, "fitness"))
     if failures:
         reason = failures[0].splitlines()[0]
         raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}")
     return 0
 
 
-def _train(command: Sequence[str], job: Job, *, go_on: bool) -> None:
-    _tell(job.do(progress_for_terminal(), command, go_on=go_on))
-
-
-def _tell(finished: Finished) -> None:
+def tell(finished: Finished) -> None:
+    """Say what one run wrote and learned."""
     directory = finished.directory
     if not finished.trained_now:
         print(f"{directory.path} is finished already; nothing was trained.")

@@ -29,8 +29,9 @@ from exneat_cli.errors import (
     check_text,
     check_whole,
 )
-from exneat_cli.records import VIDEO_FORMATS, RunDirectory, check_video_library, write_video
+from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion
+from exneat_cli.records.video import VIDEO_FORMATS, check_video_library, write_video
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Scene, load_settings, record_champion
 from exneat_cli.tasks import HasPicture, RobotTask, Task

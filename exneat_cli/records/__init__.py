@@ -1,8 +1,6 @@
 """Everything on disk: layout, columns, champions, checkpoints, manifests, locks."""
 
 from exneat_cli.records import provenance
-from exneat_cli.records.champion import Champion, Genome, Scores, read_champion, write_hall_of_fame
-from exneat_cli.records.checkpoint import read_checkpoints, write_checkpoint
 from exneat_cli.records.files import make_directory, write_json, write_whole
 from exneat_cli.records.manifest import DONE, FAILED, INTERRUPTED, MANIFEST_FORMAT, RUNNING, Manifest, Result, Score
 from exneat_cli.records.plain import as_yaml, build, converted, read_yaml
@@ -18,4 +16,3 @@ from exneat_cli.records.tables import (
     write_csv,
     write_history,
 )
-from exneat_cli.records.video import VIDEO_FORMATS, check_video_library, write_video

@@ -22,6 +22,8 @@ Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Count = Annotated[int, Meta(ge=0)]
 
 _Kind = TypeVar("_Kind")
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The same in C is ten times as fast, where PyYAML has it."""
 _NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text"}
 _NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
 """Ours for msgspec's types."""
@@ -34,7 +36,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         ExneatError: the file is missing, unreadable, no YAML, or holds something else.
     """
     try:
-        content = yaml.safe_load(read_text(path))
+        content = yaml.load(read_text(path), Loader=_LOADER)
     except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{path}:{mark.line + 1}" if mark else str(path)

@@ -20,7 +20,16 @@ import msgspec
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
-from exneat_cli.records.manifest import CHANGED_WORLDS, DONE, FAILED, MANIFEST_FORMAT, OLDER_FORMAT, Manifest, Result
+from exneat_cli.records.manifest import (
+    CHANGED_WORLDS,
+    DONE,
+    FAILED,
+    MANIFEST_FORMAT,
+    OLDER_FORMAT,
+    RUNNING,
+    Manifest,
+    Result,
+)
 from exneat_cli.records.plain import read_json, read_yaml
 
 _NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
@@ -155,7 +164,8 @@ class RunDirectory:
             return False  # it failed before anything was trained, so there is nothing to lose
         if not (lengthen if is_done else resume):
             holds = f"a finished run of {there} generations" if is_done else f"an unfinished run ({manifest.status})"
-            raise ExneatError(f"{self.path}: holds {holds}\n  add resume=true to go on from where it stopped")
+            fix = f"add resume=true to go on from where it stopped, or exneat resume run={self.path}"
+            raise ExneatError(f"{self.path}: holds {holds}\n  {fix}")
         return False
 
     def _difference(self, configuration: Mapping[str, Any]) -> str:
@@ -254,6 +264,10 @@ class RunDirectory:
             raise ExneatError(f"{self.manifest}: damaged: result: expected the figures of a finished run, got nothing")
         return manifest
 
+    def status(self, manifest: Manifest) -> str:
+        """The status that its `manifest` says, but "killed" if that is running and no process holds the run."""
+        return "killed" if manifest.status == RUNNING and not self.is_held() else manifest.status
+
     def read_result(self) -> Result:
         """The result of a finished run; see `read_manifest`."""
         result = self.read_manifest().result
@@ -271,8 +285,9 @@ class RunDirectory:
 
 
 def find_runs(output: Path) -> list[RunDirectory]:
-    """Every run below an output root, in alphabetical order."""
-    return [RunDirectory((output / manifest).parent) for manifest in sorted(glob("*/*/manifest.json", root_dir=output))]
+    """Every run below an output root, or in one of its folders, or the run that it is; in alphabetical order."""
+    places = (glob(f"{'*/' * depth}manifest.json", root_dir=output) for depth in (0, 1, 2))
+    return [RunDirectory((output / manifest).parent) for found in places for manifest in sorted(found)]
 
 
 def runs_at(pattern: Path) -> list[RunDirectory]:

@@ -6,20 +6,13 @@ the same for all variants.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 
 from exneat_cli.brains import Brains, acting_by_rule
 from exneat_cli.errors import ConfigError, ExneatError, check_section, check_whole
-from exneat_cli.records import (
-    DONE,
-    Champion,
-    RunDirectory,
-    Score,
-    merge_robustness,
-    read_champion,
-    read_robustness,
-    read_yaml,
-)
+from exneat_cli.records import DONE, RunDirectory, Score, merge_robustness, read_robustness, read_yaml
+from exneat_cli.records.champion import Champion, read_champion
 from exneat_cli.rollouts import Executor, Runner, Sweep, keep_workers, perturbed
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import robustness_row, score_all, unseen_episodes
@@ -29,18 +22,28 @@ from exneat_cli.tasks.contract import check_worlds
 
 
 def load_settings(directory: RunDirectory) -> RunSettings:
-    """The settings of a finished run, from its own config.yaml.
+    """The settings of a finished run, see `read_settings`.
 
     Raises:
-        ExneatError: there is no run, it is not finished, of another format, or its configuration is damaged.
+        ExneatError: it is not finished, or see there.
     """
-    where = f"run={directory.path}"
-    if not directory.is_there():
-        raise ExneatError(f"{where}: no run is there; exneat inspect without run= lists them")
+    settings = read_settings(directory)
     manifest = directory.read_manifest()
     if manifest.status != DONE:
-        fix = "finish it first: the command that began it, with resume=true"
-        raise ExneatError(f"{where}: expected a finished run, got status {manifest.status!r}\n  {fix}")
+        fix = f"finish it first: exneat resume run={directory.path}"
+        raise ExneatError(f"run={directory.path}: expected a finished run, got status {manifest.status!r}\n  {fix}")
+    return settings
+
+
+def read_settings(directory: RunDirectory) -> RunSettings:
+    """The settings of a run, from its own config.yaml.
+
+    Raises:
+        ExneatError: there is no run, it is of another format, or its configuration is damaged.
+    """
+    if not directory.is_there():
+        raise ExneatError(f"run={directory.path}: no run is there; exneat inspect without run= lists them")
+    manifest = directory.read_manifest()
     try:
         plain = dict(read_yaml(directory.config))
         task = TASKS.get(str(check_section("task", plain.get("task")).get("name")))
@@ -103,25 +106,26 @@ def run_robustness(
     """
     executor.check_installed()
     load_settings(directory)  # before a directory that does not exist is held
-    done = 0
-    with directory.held():
+    progress, done = progress or Progress(), 0
+    with directory.held(), contextlib.ExitStack() as ending:
         settings = load_settings(directory)
         check_sweeps(settings, sweeps, episodes)
         check_worlds(settings.task)
         acting = _acting(directory, settings)
-        for sweep in sweeps:
-            levels = missing_levels(directory, sweep, episodes)
-            if not levels:
-                continue
+        missing = {sweep: levels for sweep in sweeps if (levels := missing_levels(directory, sweep, episodes))}
+        if missing:
             directory.check_writable()
-            (progress or Progress()).say(f"{directory.path.name}: {sweep.name} at {len(levels)} levels")
+            progress.start(directory.path.name, sum(map(len, missing.values())), "level")
+            ending.callback(progress.stop)
+        for sweep, levels in missing.items():
             seeds, scores = unseen_episodes(settings, episodes), {}
             for level in levels:
                 changed = perturbed(settings.task, settings.noise, sweep, level)
                 with Runner(*changed, executor, training=False) as runner:
                     (scores[level],) = score_all(runner.run(acting, seeds))
+                done += 1
+                progress.advance(done, f"{sweep.name} {level:g}: {scores[level].fitness_mean:.4g}")
             _write(directory, settings, sweep, scores)
-            done += len(levels)
     return done
 
 

@@ -22,10 +22,9 @@ from exneat_cli.records import (
     RunDirectory,
     as_yaml,
     provenance,
-    read_checkpoints,
-    write_checkpoint,
     write_history,
 )
+from exneat_cli.records.checkpoint import read_checkpoints, write_checkpoint
 from exneat_cli.rollouts import Runner, keep_workers
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence

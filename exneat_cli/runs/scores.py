@@ -9,18 +9,15 @@ from exneat_cli.brains import Brains, acting_by_rule, assemble, motionless
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import (
     UNPERTURBED,
-    Champion,
-    Genome,
     Result,
     RobustnessRow,
     RunDirectory,
     Score,
-    Scores,
     merge_robustness,
     write_csv,
-    write_hall_of_fame,
     write_json,
 )
+from exneat_cli.records.champion import Champion, Genome, Scores, write_hall_of_fame
 from exneat_cli.rollouts import Outcomes, Runner, Trace, is_compiled
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.race import FIRST_ROUND, race
@@ -43,7 +40,7 @@ def choose_champion(training: Training, directory: RunDirectory, progress: Progr
         raise ExneatError("no team ever finished its episodes: every simulation or network exploded")
     last = training.history[-1]
     directory.update_manifest(budget_spent={key: last[key] for key in ("episodes", "env_steps", "wall_seconds")})
-    progress.say(f"validating {len(candidates)} teams")
+    progress.stage(f"validating {len(candidates)} teams")
     with Runner(settings.task, settings.noise, settings.executor, training=False) as runner:
         brains = [_compile(settings, candidate.team) for candidate in candidates]
         episodes = shared_episodes("validation", settings.validation_episodes)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from exneat_cli.brains import places_in_memory
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory
+from exneat_cli.records import RunDirectory
+from exneat_cli.records.champion import Champion
 from exneat_cli.rollouts import Noise, Sweep, perturbed, record
 from exneat_cli.runs.robustness import load_champion, load_settings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream

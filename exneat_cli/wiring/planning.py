@@ -97,7 +97,10 @@ def _by_position(name: str, parts: Sequence[Part]) -> tuple[int, ...]:
             return _numbered([part.position[axis] > 0.0 for part in parts])
         place = "in front or behind" if name == "fb" else "on the left or on the right"
     places = ", ".join(f"{part.name} at ({part.position[0]:.3g}, {part.position[1]:.3g})" for part in parts)
-    raise ConfigError("geometry", f"parts that all stand {place} for {name}", places, "use single, auto, all or custom")
+    auto = ", auto" * all(part.likeness >= 0 for part in parts)
+    raise ConfigError(
+        "geometry", f"parts that all stand {place} for {name}", places, f"use single{auto}, all or custom"
+    )
 
 
 def _are_opposite(one: Part, other: Part) -> bool:
@@ -207,21 +210,38 @@ def _has_central(task: Task, wiring: Wiring) -> bool:
 
 def _links(task: Task, linkage: str, outputs: Sequence[int], hidden: int, *, central: bool) -> list[tuple[Pin, ...]]:
     """The extra pins of each part module; refuses those that read what is not there."""
-    parts = task.parts
-    # Without hidden nodes a linkage that reads them would return no pins and pass unnoticed.
-    links = [LINKAGES[linkage](parts, own, outputs, max(1, hidden)) for own in range(len(parts))]
-    pins = [pin for own in links for pin in own]
-    if linkage != "none" and len(parts) > 1 and not pins:
-        raise ConfigError("linkage", "links that find something to read", linkage, f"task={task.name} has nothing such")
-    if not central and any(pin.module == len(parts) for pin in pins):
-        fix = "these links read a central module: set wiring.central=true"
-        if task.trunk is None:
-            fix = f"these links read a central module, and task={task.name} has no trunk for one"
-        raise ConfigError("linkage", "links that read no central module", linkage, fix)
-    if hidden == 0 and any(0 <= pin.module < len(parts) and pin.index >= outputs[pin.module] for pin in pins):
-        fix = "modules start without hidden nodes here: set evolution.module_hidden"
-        raise ConfigError("linkage", "links that read no hidden nodes", linkage, fix)
+    links = _pins(task, linkage, outputs, hidden)
+    if why := _refusal(task, linkage, links, outputs, hidden, central=central):
+        fitting = [
+            name
+            for name in LINKAGES
+            if not _refusal(task, name, _pins(task, name, outputs, hidden), outputs, hidden, central=central)
+        ]
+        raise ConfigError(
+            "linkage", f"{' or '.join(fitting)} with task={task.name} and its other settings", linkage, why
+        )
     return links
+
+
+def _pins(task: Task, linkage: str, outputs: Sequence[int], hidden: int) -> list[tuple[Pin, ...]]:
+    # Without hidden nodes a linkage that reads them would return no pins and pass unnoticed.
+    return [LINKAGES[linkage](task.parts, own, outputs, max(1, hidden)) for own in range(len(task.parts))]
+
+
+def _refusal(
+    task: Task, linkage: str, links: Sequence[Sequence[Pin]], outputs: Sequence[int], hidden: int, *, central: bool
+) -> str:
+    """All that links read and is not there, with what to set; empty if there is nothing such."""
+    parts, pins = len(task.parts), [pin for own in links for pin in own]
+    if linkage != "none" and parts > 1 and not pins:
+        return f"task={task.name} has nothing that such links could read"
+    missing = []
+    if not central and any(pin.module == parts for pin in pins):
+        fix = "set wiring.central=true" if task.trunk else f"task={task.name} has no trunk for one"
+        missing.append(f"a central module: {fix}")
+    if hidden == 0 and any(0 <= pin.module < parts and pin.index >= outputs[pin.module] for pin in pins):
+        missing.append("hidden nodes, which modules start without here: set evolution.module_hidden")
+    return f"such links read {'; and '.join(missing)}" if missing else ""
 
 
 def _central_module(task: Task, encoders: Sequence[Module], hidden: int) -> Module:

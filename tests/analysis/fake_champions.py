@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from exneat_cli.records import Champion
+from exneat_cli.records.champion import Champion
 
 
 def reads(index: int, module: int = -1, *, delayed: bool = False) -> dict[str, Any]:

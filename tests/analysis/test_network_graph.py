@@ -13,10 +13,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
+from exneat_cli.analysis import network_graph
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
 from exneat_cli.analysis.network_layout import depths, edges_of, hidden_of, lay_out, links_of, natural_size, used_nodes
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, RunDirectory, write_json
+from exneat_cli.records import RunDirectory, write_json
+from exneat_cli.records.champion import Champion
 from tests.analysis.fake_champions import (
     a_champion,
     a_genome,
@@ -191,3 +193,7 @@ def test_a_missing_or_damaged_champion_is_refused_in_one_line(tmp_path: Path) ->
     with pytest.raises(ExneatError, match=r"champion\.json: damaged.*") as raised:
         draw_network(a_run(tmp_path / "run", content))
     assert "\n" not in str(raised.value)
+
+
+def test_no_two_modules_of_a_body_have_one_colour() -> None:
+    assert len({network_graph._colour(m) for m in range(24)}) == 24

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -80,3 +81,22 @@ def test_of_a_level_that_was_tested_twice_the_longer_test_is_shown(tmp_path: Pat
     for run in (once, twice):
         draw_robustness(run, {}, "fitness")
     assert contents(once.plots) == contents(twice.plots)
+
+
+def texts(path: Path) -> list[str]:
+    """The texts of an SVG, which matplotlib writes as comments beside their outlines."""
+    return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
+
+
+def test_figures_say_what_their_marks_mean_and_what_the_run_is(tmp_path: Path) -> None:
+    run = a_run(tmp_path / "hunting" / "exneat-all-none-s3-0a1b2c", place="tiles")
+    training, path = draw_training(run, "fitness")[1], draw_path(run)[1]
+    robustness = draw_robustness(run, labels(1), "fitness", {"sweep_0": 0.5})[1]
+    for figure in (training, path, robustness):
+        assert any("hunting, exneat-all-none, seed 3" in text for text in texts(figure))
+        assert not any("0a1b2c" in text for text in texts(figure))
+    assert "training fitness" in texts(training)
+    assert {"prey", "prey, caught here", "goal", "agent", "start", "end"} <= set(texts(path))
+    assert texts(path).count("cue at the end") == 1
+    assert "as in training" in texts(robustness)
+    assert "as in training" not in texts(draw_robustness(run, labels(1), "fitness")[1])

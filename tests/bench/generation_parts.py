@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from exneat_cli.algorithms import Coevolution
-from exneat_cli.records import write_checkpoint, write_history
+from exneat_cli.records import write_history
+from exneat_cli.records.checkpoint import write_checkpoint
 from exneat_cli.rollouts import Executor, Runner
 from exneat_cli.runs import RunSettings, training
 from exneat_cli.tasks import Hunting

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,10 @@ def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pyt
     assert len([path for path in before if path.suffix == ".svg"]) == 4
     capsys.readouterr()
     assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
-    assert capsys.readouterr().out.count("all there already") == 4
+    told = capsys.readouterr().out
+    assert told.count("all there already") == 4
+    for row in rows_of(runs, "neat"):
+        assert re.search(rf"^ *{row.level:g}  +{row.fitness_mean:.4g}  +{row.fitness_std:.3g}$", told, re.MULTILINE)
     assert {path: path.read_bytes() for path in runs.rglob("robustness.*")} == before
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.main import main
-from exneat_cli.records import read_champion, read_robustness
+from exneat_cli.records import read_robustness
+from exneat_cli.records.champion import read_champion
 from tests.commands.refusals import check_refusal
 
 LEG = """

@@ -210,7 +210,7 @@ NONSENSE = [
     ({"variants": {}}, "variants: expected at least one entry"),
     ({"conditions": {}}, "conditions: expected at least one entry"),
     ({"variants": ["neat"]}, "variants: expected a section with keys of its own, got ['neat']"),
-    ({"variants": {"neat": {"label": "NEAT"}}}, "variants.neat.settings: is missing"),
+    ({"variants": {"neat": {"settings": {}}}}, "variants.neat.label: is missing"),
     ({"variants": {"neat": "NEAT"}}, "variants.neat: expected a section"),
     (variant(settings=[1]), "variants.neat.settings: expected a section"),
     (variant(label=[1]), "variants.neat.label: expected text, got [1]"),
@@ -261,6 +261,21 @@ def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_pa
     manifest = job.settings.directory.manifest
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "status": "running"}))
     assert not job.is_finished()
+
+
+def test_settings_may_be_left_out_and_a_report_names_the_experiment_that_there_are_runs_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "small.yaml"
+    random = {"label": "random", "settings": {"task": "general_maze", "algorithm": "random"}}
+    parts = {"conditions": {"clean": {"label": "clean"}}, "claim": "None.", "runs": {"smoke": 1}}
+    path.write_text(yaml.safe_dump({**parts, "variants": {"random": random, "plain": {"label": "as it comes"}}}))
+    assert [job.settings.task.name for job in plan(tmp_path)] == ["ant", "general_maze"]
+    path.write_text(yaml.safe_dump({**parts, "variants": {"random": random}}))
+    assert sweep(tmp_path) == 0
+    capsys.readouterr()
+    assert main(["report", f"output={tmp_path / 'out'}"]) == 2
+    assert f"exneat report experiment={path} output={tmp_path / 'out'}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("label", ["", " ", "NEAT", " NEAT "])

@@ -16,7 +16,7 @@ from PIL import Image
 from exneat_cli.commands import watch
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
-from exneat_cli.records import VIDEO_FORMATS
+from exneat_cli.records.video import VIDEO_FORMATS
 from tests.commands.refusals import check_refusal
 
 FFMPEG = "pip install 'exneat[video]'"

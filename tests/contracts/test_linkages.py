@@ -36,11 +36,11 @@ def test_pins_exist_and_sharers_have_equal_widths_unless_a_linkage_reads_what_is
     wiring = Wiring(central=central and body.trunk is not None)
     reads_central, reads_hidden = reads(linkage, body, hidden=3)
     if linkage == "joints" and len(body.parts) > 1 and not any(part.joints for part in body.parts):
-        with pytest.raises(ConfigError, match=r"^linkage: expected links that find something to read"):
+        with pytest.raises(ConfigError, match=r"(?s)^linkage: expected none .*nothing that such links could read"):
             plan_modules(body, Geometry(geometry), linkage, wiring, hidden=hidden)
         return
     if (reads_central and not wiring.central) or (reads_hidden and hidden == 0):
-        with pytest.raises(ConfigError, match=r"^linkage: expected links that read no"):
+        with pytest.raises(ConfigError, match=r"(?s)^linkage: expected none .*such links read"):
             plan_modules(body, Geometry(geometry), linkage, wiring, hidden=hidden)
         return
     plan = plan_modules(body, Geometry(geometry), linkage, wiring, hidden=hidden)

@@ -19,7 +19,8 @@ import pytest
 from exneat_cli.algorithms import ALGORITHMS, NEAT, RECURRENT, EvolutionSettings
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.main import main
-from exneat_cli.records import read_champion, read_yaml
+from exneat_cli.records import read_yaml
+from exneat_cli.records.champion import read_champion
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import TASKS, AntTask, Hunting
 from exneat_cli.wiring import LINKAGES, Geometry, Wiring

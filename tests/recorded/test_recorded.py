@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from exneat_cli.brains.brain import activate, lay_out, memory_size
-from exneat_cli.records import provenance, read_champion
+from exneat_cli.records import provenance
+from exneat_cli.records.champion import read_champion
 from exneat_cli.rollouts import Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train
 

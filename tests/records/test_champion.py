@@ -17,7 +17,8 @@ from exneat_cli.algorithms import Candidate, Team
 from exneat_cli.brains import Brains
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, Genome, Score, Scores, read_champion, write_hall_of_fame, write_json
+from exneat_cli.records import Score, write_json
+from exneat_cli.records.champion import Champion, Genome, Scores, read_champion, write_hall_of_fame
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training
 from exneat_cli.tasks import AntTask

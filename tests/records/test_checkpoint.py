@@ -15,8 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from exneat_cli.algorithms import State
-from exneat_cli.records import read_checkpoints, write_checkpoint
-from exneat_cli.records.checkpoint import with_digest
+from exneat_cli.records.checkpoint import read_checkpoints, with_digest, write_checkpoint
 
 ARRAYS = {"0.current.id": np.arange(5), "0.current.node.bias": np.linspace(0.0, 1.0, 7)}
 PLAIN = {"teams": [[1, 2], [3, 4]], "fitness": [0.1, -1e300]}

@@ -8,7 +8,8 @@ import pytest
 from msgspec.structs import replace
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import read_champion, read_robustness
+from exneat_cli.records import read_robustness
+from exneat_cli.records.champion import read_champion
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner, Sweep
 from exneat_cli.runs import RunSettings, is_finished, robustness, run_robustness, train
 from exneat_cli.runs.robustness import missing_levels

@@ -17,7 +17,8 @@ import yaml
 from exneat_cli.algorithms import ACTIVATIONS
 from exneat_cli.brains import Brains, assemble
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import RunDirectory, read_champion
+from exneat_cli.records import RunDirectory
+from exneat_cli.records.champion import read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs import training as training_module

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.brains import places_in_memory
-from exneat_cli.records import read_champion
+from exneat_cli.records.champion import read_champion
 from exneat_cli.rollouts import Executor, Noise, Runner, record
 from exneat_cli.runs import RunSettings, record_champion, train
 from exneat_cli.seeding import shared_episodes

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from exneat_cli.algorithms import State
-from exneat_cli.records import read_checkpoints
+from exneat_cli.records.checkpoint import read_checkpoints
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.runs.training import Training
 from exneat_cli.tasks import AntTask, TrackMaze

@@ -17,7 +17,8 @@ import pytest
 from exneat_cli.algorithms import ARS, NEAT, RECURRENT, EvolutionSettings, from_stock
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Champion, Genome, Score, Scores, read_champion
+from exneat_cli.records import Score
+from exneat_cli.records.champion import Champion, Genome, Scores, read_champion
 from exneat_cli.records.exports import export
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train

@@ -1,0 +1,38 @@
+"""`exneat resume`: go on with a run by the settings in its own directory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.jobs import name_code, with_sweeps
+from exneat_cli.commands.train import tell
+from exneat_cli.errors import ExneatError, check_keys, check_path, check_section
+from exneat_cli.records import RunDirectory, build
+from exneat_cli.rollouts import Executor
+from exneat_cli.runs import progress_for_terminal, read_settings
+
+
+def run(line: CommandLine) -> int:
+    """Go on with ``run=<directory>``; returns the exit code.
+
+    Raises:
+        ExneatError: there is no such run, its settings cannot be read, or a setting makes no sense.
+    """
+    plain = line.compose_only(("run", "generations", "task", "sweeps"), ("sweep", "executor"))
+    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
+    name_code(line, plain)
+    directory = RunDirectory(check_path("run", plain["run"], "a run directory"))
+    settings = read_settings(directory)
+    path = directory.path.absolute()
+    settings = replace(settings, resume=True, name=path.parent.name, output=str(directory.path.parent.parent))
+    if plain["generations"] is not None:
+        settings = replace(settings, generations=plain["generations"])
+    if "executor" in plain:
+        settings = replace(settings, executor=build(Executor, plain["executor"], "executor."))
+    if settings.directory.path.absolute() != path:
+        came = f"its settings belong into {settings.directory.path.name}"
+        raise ExneatError(f"run={directory.path}: is not where exneat puts such a run: {came}")
+    job = with_sweeps("resume", settings, plain)
+    tell(job.do(progress_for_terminal(), line.words, go_on=True))
+    return 0

@@ -1,0 +1,173 @@
+"""Runs side by side: what they reached, and the settings in which they differ."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.records import Manifest, RunDirectory, Score, read_yaml, write_csv
+
+MOST_SETTINGS = 8
+"""So many settings have a column on the screen; a CSV file has all of them."""
+_OWN_COLUMNS = ("fitness", "seed", "status", "run")
+_NOT_COMPARED = ("executor", "output", "name", "resume", "checkpoint_every", "seed")
+"""Settings without effect on results, and the seed, which has a column anyway."""
+_Row = list[str]
+
+
+@dataclass(frozen=True)
+class ListedRun:
+    """A run with its settings by dotted name; without manifest and settings if they cannot be read."""
+
+    directory: RunDirectory
+    status: str
+    manifest: Manifest | None
+    settings: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, directory: RunDirectory) -> ListedRun:
+        """Read what there is of it."""
+        try:
+            manifest = directory.read_manifest()
+            settings = dict(_flat(read_yaml(directory.config), ""))
+        except ExneatError:
+            return cls(directory, "damaged", None, {})
+        return cls(directory, directory.status(manifest), manifest, settings)
+
+    @property
+    def tested(self) -> Score | None:
+        """What its champion reached in the test episodes."""
+        return self.manifest.result.champion if self.manifest and self.manifest.result else None
+
+    @property
+    def fitness(self) -> float | None:
+        """The mean of that."""
+        return self.tested.fitness_mean if self.tested else None
+
+    @property
+    def seed(self) -> int | None:
+        """The root of its random streams."""
+        return self.manifest.seed if self.manifest else None
+
+    def value_of(self, column: str) -> Any:
+        """What a column of the table holds, one of those that every run has or a setting."""
+        if column in _OWN_COLUMNS:
+            return str(self.directory.path) if column == "run" else getattr(self, column)
+        return self.settings.get(column)
+
+
+def _flat(values: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def differing(runs: Iterable[ListedRun]) -> list[str]:
+    """Settings that have several values among runs, in the order of config.yaml; one that a run lacks is no value."""
+    values: dict[str, set[str]] = {}
+    for run in runs:
+        for key, value in run.settings.items():
+            if key.partition(".")[0] not in _NOT_COMPARED:
+                values.setdefault(key, set()).add(_written(value))
+    return [key for key, found in values.items() if len(found) > 1]
+
+
+def sorted_runs(runs: Sequence[ListedRun], column: str) -> list[ListedRun]:
+    """Runs in the order of a column, by fitness the best first; those that lack it come last.
+
+    Raises:
+        ConfigError: there is no such column.
+    """
+    key = _full_name(column, runs)
+    have = [run for run in runs if run.value_of(key) is not None]
+    numbers = all(isinstance(run.value_of(key), int | float) for run in have)
+    in_order = sorted(
+        have, key=lambda run: run.value_of(key) if numbers else _written(run.value_of(key)), reverse=key == "fitness"
+    )
+    return in_order + [run for run in runs if run.value_of(key) is None]
+
+
+def _full_name(column: str, runs: Sequence[ListedRun]) -> str:
+    """The column that is meant: its name, or the end of a setting's dotted one."""
+    settings = dict.fromkeys(key for run in runs for key in run.settings)
+    meant = [key for key in settings if key == column or key.endswith(f".{column}") or key == f"{column}.name"]
+    if column in (*_OWN_COLUMNS, *meant[:1]):
+        return column
+    if len(meant) == 1:
+        return meant[0]
+    close = difflib.get_close_matches(column, [*_OWN_COLUMNS, *settings], n=1)
+    fix = f"did you mean {(meant or close)[0]}?" if meant or close else ""
+    raise ConfigError("sort", f"{', '.join(_OWN_COLUMNS)} or a setting of these runs", column, fix)
+
+
+def print_runs(runs: Sequence[ListedRun]) -> None:
+    """Print a table for each folder, since the runs in it are those that can be compared."""
+    folders: dict[Path, list[ListedRun]] = {}
+    for run in runs:
+        folders.setdefault(run.directory.path.parent, []).append(run)
+    for folder, members in sorted(folders.items()):
+        if len(folders) > 1:
+            print(f"{folder}:")
+        keys = differing(members)
+        shown, left_out = keys[:MOST_SETTINGS], keys[MOST_SETTINGS:]
+        print_table(
+            [["status", "seed", "test fitness", *_short_names(shown), "run"], *(_row(run, shown) for run in members)],
+            numbers=(1, 2),
+        )
+        if left_out:
+            print(f"Differing too: {', '.join(left_out)}; exneat inspect csv=FILE writes them all.")
+        if len(folders) > 1:
+            print()
+
+
+def _row(run: ListedRun, keys: Sequence[str]) -> _Row:
+    figure = f"{run.tested.fitness_mean:.4g} (sd {run.tested.fitness_std:.3g})" if run.tested else "-"
+    seed = "?" if run.seed is None else str(run.seed)
+    settings = [_written(run.settings[key]) if key in run.settings else "-" for key in keys]
+    return [run.status, seed, figure, *settings, str(run.directory.path)]
+
+
+def _short_names(keys: Sequence[str]) -> list[str]:
+    """The last part of dotted names, and the section of what it chooses by name; whole where that could be two."""
+    short = [key.removesuffix(".name").rpartition(".")[2] for key in keys]
+    return [name if short.count(name) == 1 else key for name, key in zip(short, keys, strict=True)]
+
+
+def _written(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def print_table(rows: Sequence[_Row], numbers: Sequence[int] = ()) -> None:
+    """Print rows of cells in columns, of which `numbers` are flush right; the first row is the heading."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = [
+            cell.rjust(w) if k in numbers else cell.ljust(w)
+            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
+        print("  ".join(cells).rstrip())
+
+
+def write_runs(path: Path, runs: Sequence[ListedRun]) -> None:
+    """Write one table of all runs, with every setting in which any of them differ.
+
+    Raises:
+        ExneatError: the file cannot be written.
+    """
+    keys = differing(runs)
+    columns = ("run", "status", "variant", "seed", "test_fitness", "test_sd", "test_episodes", *keys)
+    rows = []
+    for run in runs:
+        tested, manifest = run.tested, run.manifest
+        score = (tested.fitness_mean, tested.fitness_std, tested.episodes) if tested else ("", "", "")
+        about = (manifest.variant, manifest.seed) if manifest else ("", "")
+        settings = [_written(run.settings[key]) if key in run.settings else "" for key in keys]
+        rows.append((run.directory.path, run.status, *about, *score, *settings))
+    write_csv(path, columns, rows)
