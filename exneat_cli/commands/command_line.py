@@ -9,24 +9,26 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import difflib
 import itertools
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import hydra
 import yaml
+from hydra._internal.config_loader_impl import ConfigLoaderImpl
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, Quote, QuotedString, ValueType
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
-import exneat_cli
+from exneat_cli.commands.shipped import shipped_directory as shipped_directory
 from exneat_cli.errors import ConfigError, ExneatError, check_keys
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
@@ -49,6 +51,7 @@ class CommandLine:
     config_path: Path | None  # a directory that comes before all others, such as a run's
     multirun: bool  # whether settings with several values are to be gone through
     shown: str  # help or job if that is all that is asked for, else empty
+    bases: dict[Any, DictConfig] = field(default_factory=dict, repr=False, compare=False)  # compositions made before
 
     def compose(self, *keys: str) -> dict[str, Any]:
         """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
@@ -56,12 +59,19 @@ class CommandLine:
         Raises:
             ExneatError: they do not fit together, or a key or what a value refers to is not there.
         """
-        with self.composed() as config:
-            try:
-                own = OmegaConf.masked_copy(config, list(keys) or [str(key) for key in config if key != "hydra"])
-                plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
-            except OmegaConfBaseException as error:
-                raise ExneatError(in_words(error, self.directories)) from error
+        texts: list[Override] = []
+        values: list[Override] = []
+        for text in self.settings:
+            override = OverridesParser.create().parse_override(text)
+            is_value = override.is_force_add() and not override.is_sweep_override()
+            (values if is_value else texts).append(override)
+        config = self._base(tuple(str(override.input_line) for override in texts))
+        try:
+            ConfigLoaderImpl._apply_overrides_to_config(values, config)
+            own = OmegaConf.masked_copy(config, list(keys)) if keys else config
+            plain: Any = OmegaConf.to_container(own, resolve=True, throw_on_missing=True)
+        except (OmegaConfBaseException, HydraException) as error:
+            raise ExneatError(in_words(error, self.directories)) from error
         _check_there(plain, keys)
         return {str(key): value for key, value in plain.items()}
 
@@ -75,6 +85,17 @@ class CommandLine:
         check_keys("", plain, (*needed, *optional))
         _check_there(plain, needed)
         return plain
+
+    def _base(self, chosen: tuple[str, ...]) -> DictConfig:
+        """What the YAML files say with these options of groups, without Hydra's own section.
+
+        Hydra takes a tenth of a second for it, and the runs of an experiment choose the same few options.
+        """
+        key = (self.primary, self.directories, chosen)
+        if key not in self.bases:
+            with replace(self, settings=chosen).composed() as config:
+                self.bases[key] = OmegaConf.masked_copy(config, [str(each) for each in config if each != "hydra"])
+        return copy.deepcopy(self.bases[key])
 
     @contextlib.contextmanager
     def composed(self) -> Iterator[DictConfig]:
@@ -147,13 +168,6 @@ def _check_there(plain: Mapping[str, Any], keys: Sequence[str]) -> None:
     for key in keys:
         if key not in plain:
             raise ExneatError(f"{key}: is missing")
-
-
-def shipped_directory(name: str) -> Path:
-    """A folder of data: the copy inside an installed package, else the one beside it in a checkout."""
-    package = Path(exneat_cli.__file__).parent
-    packaged = package / name
-    return packaged if packaged.is_dir() else package.parent / name
 
 
 def as_written(value: object) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import Job
@@ -34,47 +34,50 @@ def do_jobs(
     if not pending:
         return []
     alone = not line.launcher and not side_by_side(pending)
-    with contextlib.nullcontext() if alone else _told(jobs):
-        work = functools.partial(_do, jobs, len(pending), time.time(), line, alone, publisher)
-        return run_jobs(work, pending, line)
+    series = _Series([job.name for job in jobs], list(jobs), len(pending), time.time(), line.words, alone, publisher)
+    with contextlib.nullcontext() if alone else series.told():
+        return run_jobs(series.do, pending, line)
 
 
-@contextlib.contextmanager
-def _told(jobs: Sequence[Job]) -> Iterator[None]:
-    """Tell now and then how many are done, where none of them tells what it is doing."""
-    progress = Progress(sys.stderr, doing=lambda: f"{len(jobs) - _count_left(jobs)} of {len(jobs)} runs done; the rest")
-    progress.start("", len(jobs))
-    try:
-        yield
-    finally:
-        progress.stop()
+@dataclass
+class _Series:
+    """What all of the jobs share; a launcher's workers have a copy each."""
 
+    names: list[str]
+    left: list[Job]  # without those that were found to be finished
+    pending: int  # how many had to be done in the beginning
+    began: float
+    words: tuple[str, ...]  # typed, for manifests
+    alone: bool  # whether each tells what it is doing
+    publisher: Publisher | None
 
-def _count_left(jobs: Sequence[Job]) -> int:
-    return sum(not job.is_finished() for job in jobs)
+    @contextlib.contextmanager
+    def told(self) -> Iterator[None]:
+        """Tell now and then how many are done, where none of them tells what it is doing."""
+        progress = Progress(sys.stderr, doing=lambda: f"{self._count_done()} of {len(self.names)} runs done; the rest")
+        progress.start("", len(self.names))
+        try:
+            yield
+        finally:
+            progress.stop()
 
+    def _count_done(self) -> int:
+        self.left = [job for job in self.left if not job.is_finished()]
+        return len(self.names) - len(self.left)
 
-def _do(
-    jobs: Sequence[Job],
-    pending: int,
-    began: float,
-    line: CommandLine,
-    alone: bool,
-    publisher: Publisher | None,
-    job: Job,
-) -> None:
-    started, number = time.time(), 1 + [each.name for each in jobs].index(job.name)
-    counted = f"[{number:>{len(str(len(jobs)))}}/{len(jobs)}] {job.name}"
-    print(f"{counted} begins", flush=True)
-    finished = job.do(progress_for_terminal(tenths=False) if alone else Progress(), line.words, go_on=True)
-    if publisher:
-        publisher.publish([job])
-    left = _count_left(jobs)
-    seconds = (time.time() - began - seconds_compiled()) / max(1, pending - left) * left
-    when = f"about {seconds / 60:.0f} min" if seconds >= 90 else f"about {seconds:.0f} s"
-    task = job.settings.task
-    fitness = f"{task.fitness_name} {finished.result.champion.fitness_mean:.{task.fitness_decimals}f}"
-    took = f"in {time.time() - started:.1f} s, {len(jobs) - left} of {len(jobs)} done" + (
-        f", {when} left" if left else ""
-    )
-    print(f"{counted}: {fitness} {took}", flush=True)
+    def do(self, job: Job) -> None:
+        """Do one, with a line before it and one after it."""
+        started, count = time.time(), len(self.names)
+        counted = f"[{1 + self.names.index(job.name):>{len(str(count))}}/{count}] {job.name}"
+        print(f"{counted} begins", flush=True)
+        finished = job.do(progress_for_terminal(tenths=False) if self.alone else Progress(), self.words, go_on=True)
+        if self.publisher:
+            self.publisher.publish([job])
+        done = self._count_done()
+        left = count - done
+        seconds = (time.time() - self.began - seconds_compiled()) / max(1, self.pending - left) * left
+        when = f"about {seconds / 60:.0f} min" if seconds >= 90 else f"about {seconds:.0f} s"
+        task = job.settings.task
+        fitness = f"{task.fitness_name} {finished.result.champion.fitness_mean:.{task.fitness_decimals}f}"
+        took = f"in {time.time() - started:.1f} s, {done} of {count} done" + (f", {when} left" if left else "")
+        print(f"{counted}: {fitness} {took}", flush=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -195,13 +196,13 @@ class RunSettings:
         """Generations of training; 0 for a baseline, which nothing trains."""
         return 0 if self.algorithm.rule else self.generations
 
-    @property
+    @cached_property
     def directory(self) -> RunDirectory:
         """Where the run keeps its files: ``<output>/<name>/<variant>-s<seed>-<hash>``."""
         short = configuration_hash(self._identity(), with_seed=False)[:6]
         return RunDirectory(Path(self.output) / (self.name or self.task.name) / f"{self.variant}-s{self.seed}-{short}")
 
-    @property
+    @cached_property
     def full_hash(self) -> str:
         """Hash of everything that results depend on, but for the number of generations."""
         return configuration_hash(self._identity())
