@@ -203,7 +203,10 @@ def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
     process.send_signal(number)
     _, error = process.communicate(timeout=30)
     assert process.returncode == code
-    assert error.strip().splitlines()[-1].startswith("exneat: interrupted")
+    assert error.strip().splitlines()[-2:] == [
+        "exneat: interrupted; to go on:",
+        f"exneat resume run={the_run(tmp_path)}",
+    ]
     assert "Traceback" not in error
     assert json.loads((the_run(tmp_path) / "manifest.json").read_text())["status"] == "interrupted"
 
