@@ -25,6 +25,7 @@ COMMANDS = {
     "export": "write a run's champion for use elsewhere",
     "inspect": "show a run's wiring, or list the runs",
     "doctor": "say whether this machine is fit for exneat, and how to fix what is not",
+    "completion": "print what makes bash, zsh or fish complete all of this",
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
@@ -54,6 +55,7 @@ usage: exneat <command> [key=value ...]
   exneat inspect                                the runs under outputs/
   exneat inspect run=outputs/ant/<run>          one run's modules, sensors and joints
   exneat doctor                                 whether this machine is fit for exneat
+  eval "$(exneat completion bash)"              the Tab key completes commands, settings and runs
 """
 
 
@@ -92,6 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 close = difflib.get_close_matches(command, COMMANDS, n=1)
                 hint = f"did you mean {close[0]}?" if close else "see exneat --help"
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; {hint}")
+            if command == "completion":  # which composes nothing: somebody waits for it
+                return int(importlib.import_module("exneat_cli.commands.completion").run(rest, COMMANDS))
             line = importlib.import_module("exneat_cli.commands.command_line").read_command_line(command, rest)
             if line.shown:
                 print(line.show())
