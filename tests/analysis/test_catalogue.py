@@ -52,9 +52,9 @@ def test_figures_and_tables_are_read_in_the_order_of_the_file(tmp_path: Path) ->
         ("table-9.1: 3", "", "", "expected a section with keys of its own, got 3"),
     ],
 )
-def test_an_entry_that_makes_no_sense_is_refused_by_its_file_and_name_in_one_line(
+def test_an_entry_that_makes_no_sense_is_refused_by_its_file_and_name_in_a_line_or_two(
     tmp_path: Path, entry: str, old: str, new: str, named: str
 ) -> None:
     with pytest.raises(ExneatError, match=rf"catalogue.yaml: \w+-9.1: .*{named}") as raised:
         read_catalogue(written(tmp_path, entry.replace(old, new)))
-    assert "\n" not in str(raised.value)
+    assert len(str(raised.value).splitlines()) <= 2
