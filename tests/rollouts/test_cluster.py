@@ -163,7 +163,9 @@ def test_dask_is_not_imported_before_it_is_needed() -> None:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_to_all_processes_ends_them_all_with_one_line(tmp_path: Path, number: int, code: int) -> None:
+def test_a_signal_to_all_processes_ends_them_all_and_the_last_line_goes_on(
+    tmp_path: Path, number: int, code: int
+) -> None:
     settings = ["task=general_maze", "generations=100000", "executor=dask", "executor.workers=2", f"output={tmp_path}"]
     command = [Path(sys.executable).parent / "exneat", "train", *settings]
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
@@ -178,6 +180,6 @@ def test_a_signal_to_all_processes_ends_them_all_with_one_line(tmp_path: Path, n
     _, error = started.communicate(timeout=60)
     assert started.returncode == code
     shown = [line for line in error.splitlines() if not line.startswith("exneat-")]
-    assert [line.partition(";")[0] for line in shown] == ["exneat: interrupted"]
+    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to go on:", "exneat resume run"]
     assert not psutil.wait_procs(children, timeout=10)[1]
     assert [path.name for path in tmp_path.iterdir()] == ["general_maze"]

@@ -132,7 +132,7 @@ def started(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
 
 @pytest.mark.parametrize("send", [os.kill, os.killpg])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_all_processes_with_one_line(
+def test_a_signal_ends_all_processes_and_the_last_lines_say_how_to_go_on(
     tmp_path: Path, send: Callable[[int, int], None], number: int, code: int
 ) -> None:
     process, children = started(tmp_path)
@@ -140,7 +140,7 @@ def test_a_signal_ends_all_processes_with_one_line(
     _, error = process.communicate(timeout=5)
     assert process.returncode == code
     shown = [line for line in error.splitlines() if not line.startswith("exneat-")]
-    assert [line.partition(";")[0] for line in shown] == ["exneat: interrupted"]
+    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to go on:", "exneat resume run"]
     assert not psutil.wait_procs(children, timeout=2)[1]
 
 
