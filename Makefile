@@ -25,7 +25,7 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 
 ant: $(VENV)/installed ## train ExNEAT on Ant (a few minutes) and say what was learned
-	@$(BIN)/exneat train task=ant geometry=auto generations=20 resume=true
+	@$(BIN)/exneat train task=ant geometry=auto resume=true
 
 test: check docs tests ## checks, manual and tests
 
