@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,7 @@ def verdicts(study: Study) -> Iterator[str]:
             if (name, kind) in found:
                 yield f"{what}: **{kind}** in {'; '.join(found[name, kind])}."
     yield from beyond_the_rule(study)
+    yield from before_learning(study)
 
 
 def beyond_the_rule(study: Study) -> Iterator[str]:
@@ -81,6 +82,26 @@ def beyond_the_rule(study: Study) -> Iterator[str]:
         for words, places in found.items():
             if places:
                 yield f"{study.variants[name]}: {words} what linear fusion reaches untrained, in {'; '.join(places)}."
+
+
+def before_learning(study: Study) -> Iterator[str]:
+    """What the best team of the random first generation has in training already, beside the best of all generations."""
+    best: dict[str, list[tuple[float, float]]] = {}
+    for condition in study.conditions:
+        if not (study.results["condition"] == condition).any():
+            continue
+        for name, curves in study.history(condition).groupby("variant"):
+            runs = curves.groupby("seed")["best_so_far"]
+            best.setdefault(str(name), []).append((runs.first().mean(), runs.last().mean()))
+    for name in filter(best.__contains__, study.trained_variants):
+        first, last = zip(*best[name], strict=True)
+        chance = f"the best team of the random first generation earns {_range(first)} in training"
+        yield f"{study.variants[name]}: {chance}, the best of all generations {_range(last)}."
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (f"{value:.0f}" if abs(value) >= 10 else f"{value:.2f}" for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
 
 
 def as_markdown(table: Built) -> str:
