@@ -17,7 +17,7 @@ from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
 from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence
-from exneat_cli.analysis.styles import GREY, Look, save_figure, style, tick_levels, variant_styles
+from exneat_cli.analysis.styles import AS_TRAINED, GREY, Look, save_figure, style, tick_levels, variant_styles
 from exneat_cli.errors import ExneatError, check_choice
 
 Tables = dict[str, pd.DataFrame]
@@ -246,6 +246,9 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None
             axes.plot(table.index, best.mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
     if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
+    trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
+    if trained is not None:
+        axes.axvline(trained, **AS_TRAINED)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
 
 

@@ -75,9 +75,7 @@ def draw_robustness(
             axes.fill_between(x, mean - spread, mean + spread, color=styles.BLUE, alpha=0.18, linewidth=0.0, label=band)
             axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
             if trained and sweep in trained:
-                axes.axvline(
-                    trained[str(sweep)], color=styles.GREY, linestyle=":", linewidth=1.2, label="as in training"
-                )
+                axes.axvline(trained[str(sweep)], **styles.AS_TRAINED)
             styles.tick_levels(axes, x)
             axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
         for axes in panels[len(sweeps) :]:

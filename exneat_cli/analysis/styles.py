@@ -25,6 +25,8 @@ Look = dict[str, Any]
 BLACK, ORANGE, SKY, GREEN = "#000000", "#e69f00", "#56b4e9", "#009e73"
 BLUE, VERMILION, PURPLE, OLIVE = "#0072b2", "#d55e00", "#cc79a7", "#8f8700"
 GREY = "#444444"  # of what belongs to no variant or module
+AS_TRAINED: Look = {"color": GREY, "linestyle": ":", "linewidth": 1.2, "zorder": 1, "label": "as in training"}
+"""The line at the level of a sweep at which runs were trained."""
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "exneat",

@@ -114,13 +114,13 @@ class Job:
             "training": lambda: draw_training(directory, fitness, directory.read_result().champion.fitness_mean),
             "path": lambda: draw_path(directory),
             "network": lambda: draw_network(directory),
-            "robustness": lambda: draw_robustness(directory, labels, fitness, self._trained_levels()),
+            "robustness": lambda: draw_robustness(directory, labels, fitness, self.trained_levels()),
         }
         with directory.held():  # nobody may change the data between reading and drawing
             for name in self.missing_figures(directory):
                 draw[name]()
 
-    def _trained_levels(self) -> dict[str, float]:
+    def trained_levels(self) -> dict[str, float]:
         """What the setting of each sweep was in training, where that is one number."""
         plain, levels = self.settings.to_plain(), {}
         for sweep in self.sweeps:

@@ -15,7 +15,7 @@ from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
-from exneat_cli.commands.jobs import BUDGETS
+from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ExneatError, check_choice, check_path
 from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
@@ -145,7 +145,18 @@ def study_of(
         levels={name: sweep.levels for name, sweep in sweeps.items()},
         sweep_episodes=swept[0].episodes if swept else None,
         rows=tuple(rows),
+        trained={condition: _trained_levels(swept, condition) for condition in experiment.conditions},
     )
+
+
+def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
+    """The level of each sweep at which all runs of a condition were trained, where that is one."""
+    levels: dict[str, set[float]] = {}
+    for job in jobs:
+        if job.name.partition("/")[0] == condition:
+            for sweep, level in job.trained_levels().items():
+                levels.setdefault(sweep, set()).add(level)
+    return {sweep: min(found) for sweep, found in levels.items() if len(found) == 1}
 
 
 def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> str:
