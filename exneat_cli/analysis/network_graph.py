@@ -110,12 +110,14 @@ def _draw_connections(axes: Axes, champion: Champion, places: Places, width: flo
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
     """Say what lines and shapes mean, as far as they occur in one of `champions`."""
     thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
+    hidden = sum(len(layout.edges_of(champion)) - len(layout.strongest_edges(champion)) for champion in champions)
     delays = {is_delayed for champion in champions for _, _, is_delayed in layout.links_of(champion)}
     loops = not all(champion.feed_forward for champion in champions)
     entries: dict[str, styles.Look] = {
         "positive weight": {"color": POSITIVE, "linewidth": 2.0},
         "negative weight": {"color": NEGATIVE, "linewidth": 2.0},
         f"thicker: further from 0, up to {thickest}": {"linewidth": 2.8},
+        **({f"left out: the {hidden} weakest connections": {"linestyle": ""}} if hidden else {}),
         "faint: on no path from a sensor to an actuator": {"alpha": 0.3, "marker": "o"},
         "sensor": _dot("white"),
         **({"reads another module": _dot(_INNER, marker="s")} if delays else {}),
@@ -174,10 +176,10 @@ def _thick_from(champion: Champion) -> float:
 
 def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
     """Draw light ones first, so that the heavy ones stay visible among hundreds."""
-    edges, limit = layout.edges_of(champion), _thick_from(champion) or 1.0
+    edges, limit = layout.strongest_edges(champion), _thick_from(champion) or 1.0
     thickest, contrast = (2.2, 1.5) if len(edges) > _MANY_EDGES else (2.8, 1.0)
     lines, widths, colours = [], [], []
-    for source, target, weight in sorted(edges, key=lambda edge: abs(edge[2])):
+    for source, target, weight in edges:
         start, end = places[source], places[target]
         share = min(1.0, abs(weight) / limit)
         opacity = 0.16 + 0.74 * share**contrast if {source, target} <= used else FAINT
@@ -231,9 +233,16 @@ def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> Non
 
 def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
     """Write under each input what it reads, or where that does not fit how many inputs there are of each kind."""
-    plan = champion.plan
-    pins = plan.modules[m].pins
+    pins = champion.plan.modules[m].pins
     x = [places[m, -1 - k][0] for k in range(len(pins))]
+    if layout.are_by_kind(champion, m):
+        for group in layout.input_groups(champion, m):
+            left, right, y = x[group[0]], x[group[-1]], places[m, -1 - group[0]][1] - 0.07
+            axes.plot([left - 0.03, right + 0.03], [y, y], color=_GREY, linewidth=0.7)
+            name = layout.group_name(champion, m, group)
+            look: styles.Look = {"fontsize": layout.KIND_SIZE, "rotation": 90, "ha": "center", "va": "top"}
+            axes.text((left + right) / 2, y - 0.03, name, **look)
+        return
     if _POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
         for k, name in enumerate(layout.input_names(champion, m)):
             y = places[m, -1 - k][1] - 0.07
@@ -243,6 +252,5 @@ def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None
         y = places[m, -1 - group[0]][1]
         left, right = x[group[0]], x[group[-1]]
         axes.plot([left - 0.03, right + 0.03], [y - 0.1, y - 0.1], color=_GREY, linewidth=0.7)
-        words = {"sensor": "sensors", "output": "outputs\nof others", "hidden": "hidden nodes\nof others"}
-        count = f"{len(group)} {words[plan.kind_of(pins[group[0]])]}"
+        count = layout.group_name(champion, m, group).replace(" of others", "\nof others")
         axes.text((left + right) / 2, y - 0.13, count, fontsize=6.0, ha="center", va="top")
