@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
 from exneat_cli.commands.command_line import shipped_directory
-from exneat_cli.commands.sweep import experiment_names, read_experiment
+from exneat_cli.commands.sweep import Experiment, experiment_names, read_experiment
 from exneat_cli.main import main
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
@@ -24,14 +26,24 @@ IDS = [
 
 
 @pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All experiments at smoke size."""
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """All experiments at smoke size, with short episodes on Ant for as long as these tests run."""
     output = tmp_path_factory.mktemp("smoke") / "outputs"
-    with pytest.MonkeyPatch.context() as patch:  # the figures of single runs are not looked at here, and slow
-        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
-        for name in experiment_names():
-            assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
-    return output
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("sweep", "report"):
+            patch.setattr(f"exneat_cli.commands.{module}.read_experiment", shortened)
+        with pytest.MonkeyPatch.context() as meanwhile:  # the figures of single runs are not looked at here, and slow
+            meanwhile.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+            for name in experiment_names():
+                assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
+        yield output
+
+
+def shortened(name: object) -> Experiment:
+    experiment = read_experiment(name)
+    if experiment.settings.get("task") != "ant":
+        return experiment
+    return replace(experiment, settings={**experiment.settings, "task.max_steps": 50})
 
 
 def report(output: Path, *arguments: str) -> int:
