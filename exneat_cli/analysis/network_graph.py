@@ -24,7 +24,8 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion, read_champion
 
-POSITIVE, NEGATIVE = styles.BLUE, styles.VERMILION
+POSITIVE, NEGATIVE = "#00508a", "#ee7733"
+"""Of weights; one is dark and one light, so that grey print tells them apart."""
 MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles.OLIVE, styles.BLACK)
 """Of the boxes, and of the links that leave them; none is a colour of weights."""
 FAINT = 0.13
@@ -60,20 +61,26 @@ def champion_of(run: RunDirectory) -> Champion:
     return read_champion(run.champion)
 
 
-def champions_figure(title: str, champions: Sequence[Champion], titles: Sequence[str] = ()) -> Figure:
-    """Draw champions side by side, with a legend; each with a title of its own, or none."""
+def champions_figure(
+    title: str, champions: Sequence[Champion], titles: Sequence[str] = (), paper: styles.Paper = styles.SCREEN
+) -> Figure:
+    """Draw champions side by side, with a legend; each with a title of its own, or none.
+
+    Their size is what they need, on paper too.
+    """
     widths, heights = zip(*(layout.natural_size(champion) for champion in champions), strict=True)
     width, height = sum(widths) + 0.3 * (len(widths) - 1), max(heights)
-    with styles.style():
+    with paper.style():
         figure = Figure(figsize=(width, height + (1.6 if titles else 1.0)), layout="constrained")
         panels = figure.subplots(1, len(champions), squeeze=False, width_ratios=widths)[0]
         for axes, champion, wide in zip(panels, champions, widths, strict=True):
             draw_champion(axes, champion, wide, height)
         for axes, words in zip(panels, titles, strict=False):
-            axes.set_title(words, fontsize=10)
-        figure.suptitle(title, fontsize=12 if titles else 11)
+            axes.set_title(words)
+        if paper.columns is None:
+            figure.suptitle(title)
         columns = max(2, int(width // 2.6))
-        figure.legend(handles=legend_entries(champions), loc="outside lower center", ncols=columns, fontsize=8)
+        figure.legend(handles=legend_entries(champions), loc="outside lower center", ncols=columns)
     return figure
 
 

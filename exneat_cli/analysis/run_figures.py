@@ -21,9 +21,14 @@ MOST_COLUMNS = 3
 _CURVES: dict[str, styles.Look] = {
     "best_so_far": {"label": "best so far", "color": "#222222", "linewidth": 1.2, "linestyle": "--"},
     "best_fitness": {"label": "best of the generation", "color": styles.BLUE, "linewidth": 1.8},
-    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8},
-    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2},
-    "judged_fitness": {"label": "best by all of its episodes", "color": styles.PURPLE, "linewidth": 1.8},
+    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8, "linestyle": "-."},
+    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2, "linestyle": styles.DASH_DOT_DOT},
+    "judged_fitness": {
+        "label": "best by all of its episodes",
+        "color": styles.PURPLE,
+        "linewidth": 1.8,
+        "linestyle": (0.0, (8.0, 2.0)),
+    },
 }
 _TESTED: styles.Look = {"label": "champion, test mean", "color": "#222222", "linewidth": 1.2, "linestyle": ":"}
 

@@ -66,7 +66,7 @@ def test_every_id_builds_from_smoke_runs_which_stay_as_they_are(
     shown = capsys.readouterr()
     made = contents(outputs / "report")
     for name in IDS:
-        kinds = ("csv", "md") if name.startswith("table") else ("png", "svg")
+        kinds = ("csv", "md", "tex") if name.startswith("table") else ("png", "svg", "pdf")
         assert {f"{name}.{kind}" for kind in kinds} <= set(made), f"{name}: {shown.err}"
     assert "index.html" in made
     assert "0 lack runs" in shown.out
@@ -86,9 +86,13 @@ def test_one_thing_alone_is_built_and_its_axis_can_be_chosen(outputs: Path, tmp_
     shutil.copytree(outputs / "track_maze-noise_0.05-smoke", copy / "track_maze-noise_0.05-smoke")
     assert report(copy, "only=figure-4.1") == 0
     by_generation = contents(copy / "report")
-    assert sorted(by_generation) == ["figure-4.1.png", "figure-4.1.svg"]
+    assert sorted(by_generation) == ["figure-4.1.pdf", "figure-4.1.png", "figure-4.1.svg"]
     assert report(copy, "only=figure-4.1", "axis=env_steps") == 0
     assert contents(copy / "report")["figure-4.1.svg"] != by_generation["figure-4.1.svg"]
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.size: 7")
+    assert report(copy, "only=figure-4.1", "columns=1", f"style={sheet}") == 0
+    assert b"font-size: 7px" in contents(copy / "report")["figure-4.1.svg"]
 
 
 def test_what_is_missing_is_named_with_the_command_that_makes_it_and_the_rest_is_built(
