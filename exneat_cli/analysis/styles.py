@@ -153,7 +153,8 @@ def read_style_sheet(path: Path) -> dict[str, Any]:
                 close = difflib.get_close_matches(key, matplotlib.rcParams, n=1)
                 hint = f"\n  did you mean {close[0]}?" if close else ""
                 raise ExneatError(f"style={path}: {key}: matplotlib has no such setting{hint}")
-        return dict(matplotlib.rc_params_from_file(path, fail_on_error=True, use_default_template=False))
+        settings: Any = matplotlib.rc_params_from_file(path, fail_on_error=True, use_default_template=False)
+        return dict(settings)
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no UTF-8 text"
         raise ExneatError(f"style={path}: the style sheet cannot be read: {why}") from error

@@ -32,7 +32,7 @@ from exneat_cli.records.manifest import (
 )
 from exneat_cli.records.plain import read_json, read_yaml
 
-_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
+_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
 _TRIES, _PAUSE = 3, 0.02
