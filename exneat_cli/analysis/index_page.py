@@ -1,4 +1,4 @@
-"""index.html: the whole report on one page that works without network and without scripts.
+"""index.html: the whole report on one page that works without network, and without scripts too.
 
 What it shows is gathered here; how, the templates beside this file say.
 """

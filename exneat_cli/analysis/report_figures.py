@@ -18,16 +18,7 @@ from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
 from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence
-from exneat_cli.analysis.styles import (
-    AS_TRAINED,
-    GREY,
-    SCREEN,
-    Look,
-    Paper,
-    save_figure,
-    tick_levels,
-    variant_styles,
-)
+from exneat_cli.analysis.styles import AS_TRAINED, GREY, SCREEN, Look, Paper, save_figure, tick_levels, variant_styles
 from exneat_cli.errors import ExneatError, check_choice
 
 Tables = dict[str, pd.DataFrame]
