@@ -75,7 +75,7 @@ def run(line: CommandLine) -> int:
     )
     print("the same training elsewhere:")
     others = [word for word in line.words[2:] if word.partition("=")[0] not in (*_OWN, "name")]
-    settings = [f"{key}={as_written(value)}" for key, value in (space.settings | best.params).items()]
+    settings = [f"{key}={_typed(value)}" for key, value in (space.settings | best.params).items()]
     print(shlex.join(["exneat", "train", *settings, *others, f"name=best-{path.stem}"]))
     return 0
 
@@ -139,6 +139,11 @@ def _search(study: Any, space: Space, line: CommandLine, name: str, trials: int)
         study.tell(trial, finished.result.validation)
         chosen = "  ".join(f"{key.rpartition('.')[2]} {_short(value)}" for key, value in trial.params.items())
         print(f"[{done + 1}/{trials}] validation {finished.result.validation:.4g}: {chosen}", flush=True)
+
+
+def _typed(value: object) -> str:
+    """A value as somebody would type it."""
+    return value if isinstance(value, str) and value.isidentifier() else as_written(value)
 
 
 def _short(value: object) -> str:
