@@ -19,6 +19,7 @@ COMMANDS = {
     "train": "train one variant with one seed; -m trains every combination",
     "resume": "go on with an unfinished run, or make a finished one longer",
     "sweep": "train all variants of an experiment and test how they hold up",
+    "search": "look for the settings that learn best",
     "evaluate": "test finished runs under perturbations",
     "watch": "film a run's champion, its networks beside it",
     "report": "make tables, figures and a page of them from the runs there are",
@@ -30,7 +31,7 @@ COMMANDS = {
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
 _RESUMABLE = "exneat: interrupted; to go on:"
-_MAKING_FILES = ("train", "resume", "sweep", "evaluate", "report")
+_MAKING_FILES = ("train", "resume", "sweep", "search", "evaluate", "report")
 """What these say is no result, and may get lost."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
@@ -48,6 +49,7 @@ usage: exneat <command> [key=value ...]
   exneat train task=custom task.kind=my_module:MyTask   and so is this class
   exneat resume run=outputs/ant/<run>           go on with what was interrupted
   exneat sweep experiment=track_maze            all variants, conditions and seeds, trained and tested
+  exneat search space=mutation trials=60        settings chosen by what earlier ones reached
   exneat evaluate run=outputs/ant/<run> sweep=sensor_noise
   exneat watch run=outputs/ant/<run>            a film of the champion
   exneat report                                 outputs/report/index.html

@@ -28,7 +28,7 @@ FENCES = {
     "dask": {"rollouts"},
     "distributed": {"rollouts"},
 }
-IN_ONE_FILE = ("imageio_ffmpeg", "onnx")
+IN_ONE_FILE = ("imageio_ffmpeg", "onnx", "tensorboard", "wandb", "mlflow", "optuna")
 
 
 def imports_of(path: Path) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""index.html: the whole report on one page that works without network and without scripts.
+"""index.html: the whole report on one page that works without network, and without scripts too.
 
 What it shows is gathered here; how, the templates beside this file say.
 """
@@ -45,10 +45,12 @@ def write_index(
     loader, strict = jinja2.PackageLoader("exneat_cli.analysis"), jinja2.StrictUndefined
     jinja = jinja2.Environment(loader=loader, undefined=strict, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     jinja.filters |= {"anchor": lambda name: re.sub(r"[^\w.-]+", "-", name), "heading": _heading}
+    jinja.filters |= {"below": lambda built: built.caption.removeprefix(f"{built.title}. ")}
     jinja.filters |= {"picture": _picture, "link": lambda path: Path(os.path.relpath(path, directory)).as_posix()}
     jinja.tests["numeric"] = _NUMBER.fullmatch
     page = jinja.get_template("report.html.j2").render(
         studies=[(study, _facts(study)) for study in studies.values()],
+        newest=max((each.finished or "" for study in studies.values() for each in study.finished.values()), default=""),
         sections=_sections(artefacts),
         missing=list(_missing(studies, missing)),
     )
@@ -102,6 +104,10 @@ def _facts(study: Study) -> dict[str, Any]:
         "time": timedelta(seconds=round(study.results["wall_seconds"].sum())),
         "budgets": budget_sentence([study.spent_in(each, study.trained_variants) for each in conditions]),
         "films": _films(study),
+        "runs": [
+            (f"{study.variants[run.variant]}, {study.conditions[run.condition]}, seed {run.seed}", run.directory.path)
+            for run in study.finished
+        ],
         "versions": ", ".join(f"{library} {' and '.join(sorted(found))}" for library, found in versions.items()),
     }
 

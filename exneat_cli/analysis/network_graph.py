@@ -24,7 +24,8 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion, read_champion
 
-POSITIVE, NEGATIVE = styles.BLUE, styles.VERMILION
+POSITIVE, NEGATIVE = "#00508a", "#ee7733"
+"""Of weights; one is dark and one light, so that grey print tells them apart."""
 MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles.OLIVE, styles.BLACK)
 """Of the boxes, and of the links that leave them; none is a colour of weights."""
 FAINT = 0.13
@@ -60,20 +61,26 @@ def champion_of(run: RunDirectory) -> Champion:
     return read_champion(run.champion)
 
 
-def champions_figure(title: str, champions: Sequence[Champion], titles: Sequence[str] = ()) -> Figure:
-    """Draw champions side by side, with a legend; each with a title of its own, or none."""
+def champions_figure(
+    title: str, champions: Sequence[Champion], titles: Sequence[str] = (), paper: styles.Paper = styles.SCREEN
+) -> Figure:
+    """Draw champions side by side, with a legend; each with a title of its own, or none.
+
+    Their size is what they need, on paper too.
+    """
     widths, heights = zip(*(layout.natural_size(champion) for champion in champions), strict=True)
     width, height = sum(widths) + 0.3 * (len(widths) - 1), max(heights)
-    with styles.style():
+    with paper.style():
         figure = Figure(figsize=(width, height + (1.6 if titles else 1.0)), layout="constrained")
         panels = figure.subplots(1, len(champions), squeeze=False, width_ratios=widths)[0]
         for axes, champion, wide in zip(panels, champions, widths, strict=True):
             draw_champion(axes, champion, wide, height)
         for axes, words in zip(panels, titles, strict=False):
-            axes.set_title(words, fontsize=10)
-        figure.suptitle(title, fontsize=12 if titles else 11)
+            axes.set_title(words)
+        if paper.columns is None:
+            figure.suptitle(title)
         columns = max(2, int(width // 2.6))
-        figure.legend(handles=legend_entries(champions), loc="outside lower center", ncols=columns, fontsize=8)
+        figure.legend(handles=legend_entries(champions), loc="outside lower center", ncols=columns)
     return figure
 
 
@@ -110,12 +117,14 @@ def _draw_connections(axes: Axes, champion: Champion, places: Places, width: flo
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
     """Say what lines and shapes mean, as far as they occur in one of `champions`."""
     thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
+    hidden = sum(len(layout.edges_of(champion)) - len(layout.strongest_edges(champion)) for champion in champions)
     delays = {is_delayed for champion in champions for _, _, is_delayed in layout.links_of(champion)}
     loops = not all(champion.feed_forward for champion in champions)
     entries: dict[str, styles.Look] = {
         "positive weight": {"color": POSITIVE, "linewidth": 2.0},
         "negative weight": {"color": NEGATIVE, "linewidth": 2.0},
         f"thicker: further from 0, up to {thickest}": {"linewidth": 2.8},
+        **({f"left out: the {hidden} weakest connections": {"linestyle": ""}} if hidden else {}),
         "faint: on no path from a sensor to an actuator": {"alpha": 0.3, "marker": "o"},
         "sensor": _dot("white"),
         **({"reads another module": _dot(_INNER, marker="s")} if delays else {}),
@@ -174,10 +183,10 @@ def _thick_from(champion: Champion) -> float:
 
 def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
     """Draw light ones first, so that the heavy ones stay visible among hundreds."""
-    edges, limit = layout.edges_of(champion), _thick_from(champion) or 1.0
+    edges, limit = layout.strongest_edges(champion), _thick_from(champion) or 1.0
     thickest, contrast = (2.2, 1.5) if len(edges) > _MANY_EDGES else (2.8, 1.0)
     lines, widths, colours = [], [], []
-    for source, target, weight in sorted(edges, key=lambda edge: abs(edge[2])):
+    for source, target, weight in edges:
         start, end = places[source], places[target]
         share = min(1.0, abs(weight) / limit)
         opacity = 0.16 + 0.74 * share**contrast if {source, target} <= used else FAINT
@@ -231,9 +240,16 @@ def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> Non
 
 def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
     """Write under each input what it reads, or where that does not fit how many inputs there are of each kind."""
-    plan = champion.plan
-    pins = plan.modules[m].pins
+    pins = champion.plan.modules[m].pins
     x = [places[m, -1 - k][0] for k in range(len(pins))]
+    if layout.are_by_kind(champion, m):
+        for group in layout.input_groups(champion, m):
+            left, right, y = x[group[0]], x[group[-1]], places[m, -1 - group[0]][1] - 0.07
+            axes.plot([left - 0.03, right + 0.03], [y, y], color=_GREY, linewidth=0.7)
+            name = layout.group_name(champion, m, group)
+            look: styles.Look = {"fontsize": layout.KIND_SIZE, "rotation": 90, "ha": "center", "va": "top"}
+            axes.text((left + right) / 2, y - 0.03, name, **look)
+        return
     if _POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
         for k, name in enumerate(layout.input_names(champion, m)):
             y = places[m, -1 - k][1] - 0.07
@@ -243,6 +259,5 @@ def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None
         y = places[m, -1 - group[0]][1]
         left, right = x[group[0]], x[group[-1]]
         axes.plot([left - 0.03, right + 0.03], [y - 0.1, y - 0.1], color=_GREY, linewidth=0.7)
-        words = {"sensor": "sensors", "output": "outputs\nof others", "hidden": "hidden nodes\nof others"}
-        count = f"{len(group)} {words[plan.kind_of(pins[group[0]])]}"
+        count = layout.group_name(champion, m, group).replace(" of others", "\nof others")
         axes.text((left + right) / 2, y - 0.13, count, fontsize=6.0, ha="center", va="top")

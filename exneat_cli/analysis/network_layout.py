@@ -24,9 +24,14 @@ GAP = 0.3
 TITLE, OUTPUT_NAMES, SIDE, BELOW = 0.32, 0.3, 0.2, 0.15
 # Of a name below an input: its size in points, inches per character, and the characters that are shown at most.
 NAME_SIZE, CHARACTER, LONGEST_NAME = 5.0, 0.035, 48
+KIND_SIZE = 6.0  # points, of the name of many inputs
 # Least distances: of layers, of inputs, of outputs that carry a name, of a node from connections that pass it.
 LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
 
+MOST_NAMED = 60
+"""Inputs of a module beyond these have names by kind."""
+MOST_EDGES = 250
+"""Connections beyond these, the weakest, are left out of pictures."""
 _SHIFTS = (0.0, 0.15, -0.15, 0.3, -0.3)
 """By how much of the distance between its nodes a layer may move aside; the first is best among equals."""
 _SAME_ROW = 0.1
@@ -79,10 +84,44 @@ def _reachable(found: set[Node], steps: Collection[tuple[Node, Node]]) -> set[No
     return found
 
 
+def strongest_edges(champion: Champion) -> list[Edge]:
+    """The enabled connections that a picture shows, the strongest last: at most `MOST_EDGES`, or they make a mat."""
+    return sorted(edges_of(champion), key=lambda edge: abs(edge[2]))[-MOST_EDGES:]
+
+
+def are_by_kind(champion: Champion, m: int) -> bool:
+    """Whether the inputs of module `m` are too many to be named each."""
+    return len(champion.plan.modules[m].pins) > MOST_NAMED
+
+
 def input_groups(champion: Champion, m: int) -> list[list[int]]:
-    """The inputs of module `m` in their order; neighbours that read one kind of thing make a group."""
+    """The inputs of module `m` from left to right; those that read one kind of thing make a group.
+
+    In their order, or where they are too many to be named each, sensors of one quantity side by side.
+    """
     plan, pins = champion.plan, champion.plan.modules[m].pins
-    return [list(group) for _, group in groupby(range(len(pins)), key=lambda k: plan.kind_of(pins[k]))]
+    if not are_by_kind(champion, m):
+        return [list(group) for _, group in groupby(range(len(pins)), key=lambda k: plan.kind_of(pins[k]))]
+    groups: dict[tuple[str, str], list[int]] = {}
+    for k, pin in enumerate(pins):
+        quantity = _quantity(champion.name_of(pin)) if pin.is_sensor else ""
+        groups.setdefault((plan.kind_of(pin), quantity), []).append(k)
+    return list(groups.values())
+
+
+def group_name(champion: Champion, m: int, group: Sequence[int]) -> str:
+    """How many inputs of module `m` are in a group, and what they read."""
+    pin = champion.plan.modules[m].pins[group[0]]
+    quantity = _quantity(champion.name_of(pin)) if pin.is_sensor and are_by_kind(champion, m) else ""
+    others = {"sensor": "sensors", "output": "outputs of others", "hidden": "hidden nodes of others"}
+    return f"{len(group)} {quantity or others[champion.plan.kind_of(pin)]}"
+
+
+def _quantity(name: str) -> str:
+    """What a sensor measures, with its unit: "velocity (m/s)" of "trunk velocity x (m/s)"."""
+    subject, _, unit = name.replace("_", " ").partition(" (")
+    words = [word for word in subject.partition(",")[0].split() if len(word) > 1 and not word.isdigit()]
+    return (words or [subject])[-1] + (f" ({unit}" if unit else "")
 
 
 def input_names(champion: Champion, m: int) -> list[str]:
@@ -93,7 +132,11 @@ def input_names(champion: Champion, m: int) -> list[str]:
 
 def below_inputs(champion: Champion) -> float:
     """Inches below the inputs, alike in all modules: their longest name stands upright there."""
-    lengths = [len(name) for m in range(len(champion.plan.modules)) for name in input_names(champion, m)]
+    lengths = []
+    for m in range(len(champion.plan.modules)):
+        groups = input_groups(champion, m) if are_by_kind(champion, m) else []
+        names = [group_name(champion, m, group) for group in groups] or input_names(champion, m)
+        lengths += [len(name) * (KIND_SIZE / NAME_SIZE if groups else 1.0) for name in names]
     return BELOW + CHARACTER * max(8, *lengths)
 
 
@@ -180,7 +223,8 @@ def _places(champion: Champion, m: int, box: Bbox, below: float) -> Places:
     groups = input_groups(champion, m)
     slots = _spread(box, len(module.pins) + len(groups) - 1)
     # An empty slot between groups.
-    places = {(m, -1 - k): (slots[k + gap], bottom) for gap, group in enumerate(groups) for k in group}
+    in_order = [(gap, k) for gap, group in enumerate(groups) for k in group]
+    places = {(m, -1 - k): (slots[place + gap], bottom) for place, (gap, k) in enumerate(in_order)}
     depth = depths(hidden, edges)
     layers = [list(layer) for _, layer in groupby(sorted(hidden, key=depth.__getitem__), key=depth.__getitem__)]
     for d, layer in enumerate(layers, start=1):

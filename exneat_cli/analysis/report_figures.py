@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,7 +18,7 @@ from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
 from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence
-from exneat_cli.analysis.styles import GREY, Look, save_figure, style, tick_levels, variant_styles
+from exneat_cli.analysis.styles import AS_TRAINED, GREY, SCREEN, Look, Paper, save_figure, tick_levels, variant_styles
 from exneat_cli.errors import ExneatError, check_choice
 
 Tables = dict[str, pd.DataFrame]
@@ -45,8 +46,10 @@ _WHAT_IS_SHOWN = {
 }
 
 
-def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path, axis: str = "generation") -> Built:
-    """Draw one figure of the catalogue as ``<name>.png`` and ``<name>.svg`` in `directory`.
+def draw_figure(
+    plan: FigurePlan, studies: Mapping[str, Study], directory: Path, axis: str = "generation", paper: Paper = SCREEN
+) -> Built:
+    """Draw one figure of the catalogue as ``<name>.png``, ``<name>.svg`` and ``<name>.pdf`` in `directory`.
 
     `studies` are by the name of their experiment; training curves run over `axis`, one of `AXES`.
 
@@ -61,8 +64,11 @@ def draw_figure(plan: FigurePlan, studies: Mapping[str, Study], directory: Path,
         studies = {name: study.only(plan.variants) for name, study in studies.items()}
     if plan.kind == "network" or axis != "generation":
         studies = {name: study.on_disk() for name, study in studies.items()}
-    figure, sentences = _draw_champions(plan, studies) if plan.kind == "network" else _draw_panels(plan, studies, axis)
-    paths = save_figure(figure, directory / plan.name)
+    if plan.kind == "network":
+        figure, sentences = _draw_champions(plan, studies, paper)
+    else:
+        figure, sentences = _draw_panels(plan, studies, axis, paper)
+    paths = save_figure(figure, directory / plan.name, paper, ("png", "svg", "pdf"))
     return Built(plan.name, plan.title, " ".join(filter(None, [f"{plan.title}.", *sentences])), tuple(paths))
 
 
@@ -81,7 +87,7 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
         raise MissingRunsError(f"{plan.name}: no variant {whose} is trained, so there are no runs to show")
 
 
-def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Figure, list[str]]:
+def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study], paper: Paper) -> tuple[Figure, list[str]]:
     """Of each panel's variant the champion of the run that was best on validation, side by side."""
     champions, titles, sentences = [], [], []
     for panel in plan.panels:
@@ -93,23 +99,37 @@ def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study]) -> tuple[Fig
         chosen = f"best on validation of {len(ranked)} runs" if len(ranked) > 1 else "the only run"
         score = f"test {study.fitness_name} {champions[-1].scores.test.fitness_mean:.4g}"
         sentences.append(f"{titles[-1]}: seed {ranked[0].seed}, {chosen}, budget {study.budget}, {score}.")
-    return champions_figure(plan.title, champions, titles), [*sentences, "Disabled connections are left out."]
+    return champions_figure(plan.title, champions, titles, paper), [*sentences, "Disabled connections are left out."]
 
 
-def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str) -> tuple[Figure, list[str]]:
-    # Clusters need room for every variant at every level.
-    sizes = {1: (10.4, 5.2), 2: (16.0, 5.2)} if plan.kind == "cluster" else {1: (7.0, 4.8), 2: (10.4, 4.8)}
-    width, height = sizes.get(len(plan.panels), (4.8 * len(plan.panels), 4.8))
+def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str, paper: Paper) -> tuple[Figure, list[str]]:
+    rows, beside, width, height = _room(plan, paper)
     counts = []
-    with style():
+    with paper.style():
         figure = Figure(figsize=(width, height), layout="constrained")
-        for axes, panel in zip(figure.subplots(1, len(plan.panels), squeeze=False)[0], plan.panels, strict=True):
+        places = figure.subplots(rows, beside, squeeze=False).ravel()
+        for axes, panel in zip(places, plan.panels, strict=False):
             study = studies[panel.experiment]
             counts.append(draw_panel(plan.kind, axes, panel, study, axis))
-            axes.set_title(study.conditions[panel.condition], fontsize=10)
-        figure.suptitle(plan.title, fontsize=12)
-        _add_legend(figure, width)
+            axes.set_title(study.conditions[panel.condition])
+        for axes in places[len(plan.panels) :]:
+            axes.remove()
+        if paper.columns is None:  # a paper has it in its caption
+            figure.suptitle(plan.title)
+        lines = _add_legend(figure, width)
+        if paper.columns:
+            figure.set_figheight(height + 0.16 * lines)
     return figure, list(_sentences(plan, studies, counts, axis))
+
+
+def _room(plan: FigurePlan, paper: Paper) -> tuple[int, int, float, float]:
+    """Rows and columns of panels, width and height (inches) of their figure."""
+    panels = len(plan.panels)
+    if paper.columns:
+        return paper.grid(panels)
+    # Clusters need room for every variant at every level.
+    sizes = {1: (10.4, 5.2), 2: (16.0, 5.2)} if plan.kind == "cluster" else {1: (7.0, 4.8), 2: (10.4, 4.8)}
+    return 1, panels, *sizes.get(panels, (4.8 * panels, 4.8))
 
 
 def _kept(label: str) -> str:
@@ -117,15 +137,17 @@ def _kept(label: str) -> str:
     return f"{_KEPT}{label}"
 
 
-def _add_legend(figure: Figure, width: float) -> None:
-    """Add one legend for all panels, below them, so that it covers no data."""
+def _add_legend(figure: Figure, width: float) -> int:
+    """Add one legend for all panels, below them, so that it covers no data; returns how many lines it has."""
     entries: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label).removeprefix(_KEPT), handle)
-    inches = 0.6 + 0.075 * max(len(label) for label in entries)  # an entry's, roughly: its key and its letters
+    letter = rcParams["font.size"] / 133  # inches, roughly
+    inches = 8 * letter + letter * max(len(label) for label in entries)  # an entry's: its key and its letters
     columns = max(1, min(len(entries), int(width / inches)))
-    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, fontsize=9)
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
+    return -(-len(entries) // columns)
 
 
 def _sentences(
@@ -204,7 +226,8 @@ def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_ru
                 axes.plot(tables[variant][seed].dropna(), color=look["color"], linewidth=0.6, alpha=0.55, zorder=1)
         else:
             _draw_band(axes, curves, look)
-        marks: Look = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": 2.6 if each_run else 1.8}
+        thickness = (1.7 if each_run else 1.2) * rcParams["lines.linewidth"]
+        marks: Look = {"markevery": max(1, len(curves) // MARKERS_PER_CURVE), "linewidth": thickness}
         axes.plot(curves.index, curves.mean(axis=1), label=_kept(study.variants[variant]), **look, **marks)
     axes.set(xlabel=_AXIS_LABELS[axis], ylabel=f"best {study.fitness_name} so far")
     if axis == "generation":
@@ -246,6 +269,9 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None
             axes.plot(table.index, best.mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
     if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
+    trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
+    if trained is not None:
+        axes.axvline(trained, **AS_TRAINED)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
 
 

@@ -21,9 +21,14 @@ MOST_COLUMNS = 3
 _CURVES: dict[str, styles.Look] = {
     "best_so_far": {"label": "best so far", "color": "#222222", "linewidth": 1.2, "linestyle": "--"},
     "best_fitness": {"label": "best of the generation", "color": styles.BLUE, "linewidth": 1.8},
-    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8},
-    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2},
-    "judged_fitness": {"label": "best by all of its episodes", "color": styles.PURPLE, "linewidth": 1.8},
+    "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8, "linestyle": "-."},
+    "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2, "linestyle": styles.DASH_DOT_DOT},
+    "judged_fitness": {
+        "label": "best by all of its episodes",
+        "color": styles.PURPLE,
+        "linewidth": 1.8,
+        "linestyle": (0.0, (8.0, 2.0)),
+    },
 }
 _TESTED: styles.Look = {"label": "champion, test mean", "color": "#222222", "linewidth": 1.2, "linestyle": ":"}
 
@@ -75,9 +80,7 @@ def draw_robustness(
             axes.fill_between(x, mean - spread, mean + spread, color=styles.BLUE, alpha=0.18, linewidth=0.0, label=band)
             axes.plot(x, mean, "o-", color=styles.BLUE, markersize=4.0, label="mean over episodes")
             if trained and sweep in trained:
-                axes.axvline(
-                    trained[str(sweep)], color=styles.GREY, linestyle=":", linewidth=1.2, label="as in training"
-                )
+                axes.axvline(trained[str(sweep)], **styles.AS_TRAINED)
             styles.tick_levels(axes, x)
             axes.set(xlabel=labels.get(str(sweep), str(sweep)), ylabel=fitness_name)
         for axes in panels[len(sweeps) :]:

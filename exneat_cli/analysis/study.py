@@ -68,6 +68,7 @@ class Study:
         levels: sweep -> the planned levels; None takes whatever levels there are.
         sweep_episodes: the planned test episodes per level; None takes any number.
         rows: published runs of the experiment, of any budget and settings.
+        trained: condition -> sweep -> the level at which all of its runs were trained, where there is one.
     """
 
     experiment: str
@@ -85,6 +86,7 @@ class Study:
     levels: Mapping[str, tuple[float, ...]] | None = None
     sweep_episodes: int | None = None
     rows: tuple[PublishedRun, ...] = ()
+    trained: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def first_variant(self) -> str:

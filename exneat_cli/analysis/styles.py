@@ -1,13 +1,15 @@
 """How figures look, and how they are saved so that equal data gives equal bytes.
 
-Variants have colours that colour-blind readers can tell apart, and shapes for grey print.
+Variants have colours that colour-blind readers can tell apart, and shapes and dashes for grey print.
 """
 
 from __future__ import annotations
 
+import difflib
 import io
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,32 +18,51 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory, make_directory, write_whole
 
 Look = dict[str, Any]
 """Matplotlib's keywords for the line of a variant's mean: ``color``, ``marker``, ``linestyle`` and others."""
 
-# Okabe and Ito, "Color universal design" (2008); their yellow is darkened, or lines of it vanish on white.
+# Okabe and Ito, "Color universal design" (2008); their yellow is darkened, or lines of it vanish on white,
+# and so far that those who see no red or no green do not take it for vermilion.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#e69f00", "#56b4e9", "#009e73"
-BLUE, VERMILION, PURPLE, OLIVE = "#0072b2", "#d55e00", "#cc79a7", "#8f8700"
+BLUE, VERMILION, PURPLE, OLIVE = "#0072b2", "#d55e00", "#cc79a7", "#5c5800"
 GREY = "#444444"  # of what belongs to no variant or module
+AS_TRAINED: Look = {"color": GREY, "linestyle": ":", "linewidth": 1.2, "zorder": 1, "label": "as in training"}
+"""The line at the level of a sweep at which runs were trained."""
 
-_STYLE: dict[Any, Any] = {
+_STYLE: dict[str, Any] = {
     "svg.hashsalt": "exneat",
+    "svg.fonttype": "none",  # text stays text, which readers search and editors change
+    "pdf.fonttype": 42,  # TrueType; publishers refuse the outlines that are the default
     "text.parse_math": False,  # labels of users are text, dollars and backslashes too
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.titlesize": "medium",
+    "figure.titlesize": "large",
     "grid.alpha": 0.25,
     "legend.frameon": False,
+    "legend.fontsize": "small",
     "font.size": 10,
+    "savefig.dpi": 150,
 }
-_METADATA: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
-_DASH_DOT_DOT = (0.0, (4.0, 1.5, 1.0, 1.5, 1.0, 1.5))
+_PRINTED: dict[str, Any] = {"font.size": 8, "lines.linewidth": 1.0, "lines.markersize": 5.0, "savefig.dpi": 300}
+_COLUMN_WIDTHS = {1: 3.5, 2: 7.16}
+"""Width (inches) of figures of one and of two columns: IEEE, "Preparation of papers" (2014)."""
+_NARROWEST_PANEL = 2.3  # inches, with axis labels of 8 points
+_ASPECT, _HIGHEST_PANEL = 0.72, 3.0  # of panels on paper: height in widths, and in inches
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+DASH_DOT_DOT = (0.0, (4.0, 1.5, 1.0, 1.5, 1.0, 1.5))
 
 
 def _look(colour: str, marker: str, line: str | tuple[float, tuple[float, ...]] = "-") -> Look:
-    rim = {"markersize": 6.0, "markeredgecolor": "white", "markeredgewidth": 0.6}
+    rim = {"markeredgecolor": "white", "markeredgewidth": 0.6}
     return {"color": colour, "marker": marker, "linestyle": line, "zorder": 3, **rim}
 
 
@@ -59,13 +80,16 @@ _TRAINED = {
     "cross": _look(OLIVE, "*"),
 }
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK, OLIVE, VERMILION)
-_MORE_TRAINED = [_look(colour, marker) for colour, marker in zip(_COLOURS, "<>phd8HX", strict=True)]
+_MORE_TRAINED = [
+    *(_look(colour, marker) for colour, marker in zip(_COLOURS, "<>phd8HX", strict=True)),
+    *(_look(colour, marker, "--") for colour, marker in zip(_COLOURS, "vPX*s^do", strict=True)),
+]
 _BASELINES = {
     "random": _look("#8a8a8a", "", ":"),
     "linear_fusion": _look("#4d4d4d", "", "-."),
-    "motionless": _look("#6b6b6b", "", _DASH_DOT_DOT),
+    "motionless": _look("#6b6b6b", "", DASH_DOT_DOT),
 }
-_MORE_BASELINES = [_look("#7a7a7a", "", line) for line in (":", "-.", _DASH_DOT_DOT)]
+_MORE_BASELINES = [_look("#7a7a7a", "", line) for line in (":", "-.", DASH_DOT_DOT)]
 
 
 def variant_styles(variants: Collection[str], baselines: Collection[str] = ()) -> dict[str, Look]:
@@ -86,9 +110,62 @@ def _chosen(names: Sequence[str], known: Mapping[str, Look], others: Sequence[Lo
     return looks | {name: free[k % len(free)] for k, name in enumerate(strangers)}
 
 
+@dataclass(frozen=True)
+class Paper:
+    """What figures are made for: the screen, or one or two columns of a paper.
+
+    Attributes:
+        columns: 1 or 2; None is the screen, where figures are larger and have titles.
+        sheet: matplotlib's settings that count more than ours.
+    """
+
+    columns: int | None = None
+    sheet: Mapping[str, Any] = field(default_factory=dict)
+
+    def style(self) -> AbstractContextManager[None]:
+        """Context in which figures are made and saved; a matplotlibrc of the user's own does not count there."""
+        printed = _PRINTED if self.columns else {}
+        settings: Any = {**_STYLE, **printed, **self.sheet}
+        return matplotlib.style.context(settings, after_reset=True)
+
+    def grid(self, panels: int) -> tuple[int, int, float, float]:
+        """Rows and columns of panels that fit on paper, and width and height (inches) of a figure of them."""
+        width = _COLUMN_WIDTHS[self.columns or 2]
+        beside = min(panels, int(width // _NARROWEST_PANEL))
+        rows = -(-panels // beside)
+        return rows, beside, width, rows * min(_HIGHEST_PANEL, _ASPECT * width / beside)
+
+
+SCREEN = Paper()
+
+
+def read_style_sheet(path: Path) -> dict[str, Any]:
+    """Read a style sheet of matplotlib's (``.mplstyle``), a line ``key: value`` for each setting.
+
+    Raises:
+        ExneatError: it is no such file, or has a key or value that matplotlib does not know.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        keys = [key for line in lines if (key := line.partition("#")[0].partition(":")[0].strip())]
+        for key in keys:
+            if key not in matplotlib.rcParams:
+                close = difflib.get_close_matches(key, matplotlib.rcParams, n=1)
+                hint = f"\n  did you mean {close[0]}?" if close else ""
+                raise ExneatError(f"style={path}: {key}: matplotlib has no such setting{hint}")
+        settings: Any = matplotlib.rc_params_from_file(path, fail_on_error=True, use_default_template=False)
+        return dict(settings)
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no UTF-8 text"
+        raise ExneatError(f"style={path}: the style sheet cannot be read: {why}") from error
+    except ValueError as error:
+        why = str(error).splitlines()[0]
+        raise ExneatError(f"style={path}: a value that matplotlib does not take: {why}") from error
+
+
 def style() -> AbstractContextManager[None]:
-    """Context in which figures are made and saved; a matplotlibrc of the user's own does not count there."""
-    return matplotlib.style.context(_STYLE, after_reset=True)
+    """Context in which figures for the screen are made."""
+    return SCREEN.style()
 
 
 def run_title(run: RunDirectory) -> str:
@@ -105,18 +182,24 @@ def tick_levels(axes: Axes, levels: Iterable[float]) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def save_figure(figure: Figure, path: Path) -> list[Path]:
-    """Write ``path.png`` and ``path.svg``, also where the name has dots of its own; returns both paths.
+def save_figure(figure: Figure, path: Path, paper: Paper = SCREEN, kinds: Sequence[str] = ("png", "svg")) -> list[Path]:
+    """Write ``path.<kind>`` for all `kinds`, also where the name has dots of its own; returns all paths.
 
     Raises:
-        ExneatError: they cannot be written.
+        ExneatError: they cannot be drawn with the settings of the paper, or not be written.
     """
     make_directory(path.parent)
     written = []
-    for kind, metadata in _METADATA.items():
+    for kind in kinds:
         buffer = io.BytesIO()
-        with style():
-            figure.savefig(buffer, format=kind, metadata=metadata, dpi=150)
+        with paper.style():
+            try:
+                figure.savefig(buffer, format=kind, metadata=_METADATA[kind])
+            except (RuntimeError, ValueError) as error:
+                if not paper.sheet:
+                    raise
+                why = (str(error).strip() or type(error).__name__).splitlines()[0]
+                raise ExneatError(f"{path}.{kind}: cannot be drawn with that style=: {why}") from error
         written.append(path.with_name(f"{path.name}.{kind}"))
         write_whole(written[-1], buffer.getvalue())
     return written

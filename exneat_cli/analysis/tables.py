@@ -1,4 +1,4 @@
-"""Tables as CSV for machines and Markdown for people: those of the catalogue, and one comparison per experiment.
+"""Tables as CSV, Markdown and LaTeX: those of the catalogue, and one comparison per experiment.
 
 Both show lines of a summary, one per condition, variant and quantity: a table of the catalogue one under another,
 beside what was published; a comparison with the quantities side by side.
@@ -15,6 +15,7 @@ import pandas as pd
 
 from exneat_cli.analysis.captions import table_sentences
 from exneat_cli.analysis.catalogue import Built, Column, TablePlan
+from exneat_cli.analysis.latex import latex_table
 from exneat_cli.analysis.statistics import compare, efficiency, mean
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study
 from exneat_cli.errors import check_choice
@@ -31,7 +32,7 @@ _PLACE = ["condition", "variant", "quantity", "published"]
 
 
 def build_table(plan: TablePlan, studies: Mapping[str, Study], directory: Path) -> Built:
-    """Write ``<name>.csv`` and ``<name>.md`` into `directory`: one line per row and column of the plan.
+    """Write ``<name>.csv``, ``<name>.md`` and ``<name>.tex`` into `directory`: one line per row and column of the plan.
 
     Raises:
         MissingRunsError: a variant of the table, or the one that it is compared with, lacks runs or a level.
@@ -88,7 +89,7 @@ def _planned_lines(plan: TablePlan, studies: Mapping[str, Study]) -> pd.DataFram
 
 
 def build_comparison(study: Study, directory: Path) -> Built:
-    """Write ``comparison-<experiment>.csv`` and ``.md`` into `directory`: one line per condition and variant.
+    """Write ``comparison-<experiment>.csv``, ``.md`` and ``.tex`` into `directory`: one line per condition and variant.
 
     Conditions without a finished run are left out. Where the first variant has none, nothing is compared with it.
 
@@ -160,16 +161,17 @@ def rounded(value: float, decimals: int) -> str:
 
 
 def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFrame) -> Built:
-    """Write ``<name>.csv`` from `exact`, with every digit, and ``<name>.md`` from `cells`."""
+    """Write ``<name>.csv`` from `exact`, with every digit, and ``<name>.md`` and ``<name>.tex`` from `cells`."""
     header, rows = tuple(cells.columns), tuple(cells.itertuples(index=False, name=None))
     make_directory(directory)
-    paths = directory / f"{words.name}.csv", directory / f"{words.name}.md"
+    paths = tuple(directory / f"{words.name}.{kind}" for kind in ("csv", "md", "tex"))
     write_whole(paths[0], exact.to_csv(index=False, lineterminator="\n"))
     lines = [
         "| " + " | ".join(" ".join(text.split()).replace("|", "\\|") for text in texts) + " |"
         for texts in (header, ["---"] * len(header), *rows)
     ]
     write_whole(paths[1], "\n".join([f"# {words.name}: {words.title}", "", *lines, "", words.caption, ""]))
+    write_whole(paths[2], latex_table(f"{words.name}: {words.title}", words.caption, header, rows))
     return words._replace(paths=paths, header=header, rows=rows)
 
 

@@ -34,7 +34,7 @@ from exneat_cli.errors import ConfigError, ExneatError, check_keys
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
 _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
-_TEXTS = {"name", "output", "run", "experiment", "only", "task.model", "task.env_id"}
+_TEXTS = {"name", "output", "run", "experiment", "only", "space", "style", "task.model", "task.env_id"}
 """Settings that are names and paths: what is typed for them is text, also where it looks like a number or a list."""
 _LONGEST = 300
 

@@ -13,7 +13,7 @@ from typing import Any
 _LINE = re.compile(r"(?P<indent> *)(?P<item>- )?(?P<key>[\w/@.]+):(?P<value>.*?)(?:\s# ?(?P<comment>.*))?$")
 _OPTIONAL = ("override", "optional")
 _COLUMN = 38
-_ALL = ("train", "sweep")
+_ALL = ("train", "sweep", "search")
 """Commands that take whatever their composition holds; others take what their own file names."""
 
 

@@ -6,6 +6,7 @@ Genomes and simulators take a second to import, which the list does without.
 from __future__ import annotations
 
 import glob
+import sys
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.run_table import ListedRun, print_runs, sorted_runs, write_runs
@@ -38,7 +39,7 @@ def run(line: CommandLine) -> int:
     pattern = None if plain["run"] is None else check_path("run", plain["run"], "a run directory, or a pattern")
     if pattern is None:
         output = check_path("output", plain["output"])
-        found = find_runs(output)
+        found = find_runs(output, _tell_unreadable)
     else:
         found = runs_at(pattern)
         if len(found) == 1 or not glob.has_magic(str(pattern)):
@@ -57,3 +58,7 @@ def run(line: CommandLine) -> int:
         write_runs(check_path("csv", plain["csv"], "a file to write"), runs)
     print_runs(runs)
     return 0
+
+
+def _tell_unreadable(error: OSError) -> None:
+    print(f"exneat: {error.filename}: cannot be read: {error.strerror}; runs in it are not listed", file=sys.stderr)

@@ -14,7 +14,7 @@ from exneat_cli.commands.command_line import CommandLine, as_written
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_keys, check_path, check_section
 from exneat_cli.records import RunDirectory, runs_at
 from exneat_cli.rollouts import Executor, Sweep
-from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_finished, run_robustness, train
+from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_finished, run_robustness, tracked, train
 from exneat_cli.tasks.user_code import NAMED, code_in
 
 _one_at_a_time = threading.Lock()
@@ -51,11 +51,13 @@ class Job:
         Raises:
             ExneatError: the run directory is unusable, or holds something else.
         """
-        finished = train(self.settings, progress=progress, command=command, go_on=go_on)
-        with _one_at_a_time:
-            self.test(finished.directory, self.settings.executor, progress)
-            if self.video and not self.settings.algorithm.rule:
-                self._film(finished.directory)
+        with tracked(self.settings.trackers) as tracking:
+            finished = train(self.settings, progress=progress, command=command, go_on=go_on, tracking=tracking)
+            with _one_at_a_time:
+                self.test(finished.directory, self.settings.executor, progress)
+                if self.video and not self.settings.algorithm.rule:
+                    self._film(finished.directory)
+            tracking.pictures(finished.directory)
         return finished
 
     def _film(self, directory: RunDirectory) -> None:
@@ -114,13 +116,13 @@ class Job:
             "training": lambda: draw_training(directory, fitness, directory.read_result().champion.fitness_mean),
             "path": lambda: draw_path(directory),
             "network": lambda: draw_network(directory),
-            "robustness": lambda: draw_robustness(directory, labels, fitness, self._trained_levels()),
+            "robustness": lambda: draw_robustness(directory, labels, fitness, self.trained_levels()),
         }
         with directory.held():  # nobody may change the data between reading and drawing
             for name in self.missing_figures(directory):
                 draw[name]()
 
-    def _trained_levels(self) -> dict[str, float]:
+    def trained_levels(self) -> dict[str, float]:
         """What the setting of each sweep was in training, where that is one number."""
         plain, levels = self.settings.to_plain(), {}
         for sweep in self.sweeps:

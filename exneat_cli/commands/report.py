@@ -13,15 +13,16 @@ from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel, TablePlan, r
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
+from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine, shipped_directory
-from exneat_cli.commands.jobs import BUDGETS
+from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
-from exneat_cli.errors import ExneatError, check_choice, check_path
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
 from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
 from exneat_cli.tasks import HasFullReward
 
-_OWN = ("experiment", "only", "axis")
+_OWN = ("experiment", "only", "axis", "columns", "style")
 """Settings of the report that are none of its runs; conf/report.yaml explains them."""
 
 
@@ -31,8 +32,9 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: an argument makes no sense, there are no runs, or the one thing asked for lacks runs.
     """
-    asked = line.compose("experiment", "budget", "only", "axis", "output")
+    asked = line.compose("budget", "output", *_OWN)
     check_choice("axis", asked["axis"], AXES)
+    paper = _paper(asked)
     asked["output"] = str(check_path("output", asked["output"]))
     own = None if asked["experiment"] is None else read_experiment(asked["experiment"])
     artefacts = _artefacts(asked, own)
@@ -64,7 +66,7 @@ def run(line: CommandLine) -> int:
     for name, artefact in artefacts.items():
         try:
             if isinstance(artefact, FigurePlan):
-                built.append(draw_figure(artefact, studies, directory, asked["axis"]))
+                built.append(draw_figure(artefact, studies, directory, asked["axis"], paper))
             else:
                 built.append(build_table(artefact, studies, directory))
         except MissingRunsError as error:
@@ -79,6 +81,14 @@ def run(line: CommandLine) -> int:
         page = write_index(directory, studies, built, missing)
         print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs\n{page}")
     return 0
+
+
+def _paper(asked: Mapping[str, Any]) -> Paper:
+    if asked["columns"] not in (None, 1, 2):
+        raise ConfigError("columns", "1 or 2, or null for figures to be read on a screen", asked["columns"])
+    sheet = asked["style"]
+    own = {} if sheet is None else read_style_sheet(check_path("style", sheet, "a style sheet of matplotlib's"))
+    return Paper(asked["columns"], own)
 
 
 def _artefacts(asked: Mapping[str, Any], own: Experiment | None) -> dict[str, FigurePlan | TablePlan]:
@@ -145,7 +155,18 @@ def study_of(
         levels={name: sweep.levels for name, sweep in sweeps.items()},
         sweep_episodes=swept[0].episodes if swept else None,
         rows=tuple(rows),
+        trained={condition: _trained_levels(swept, condition) for condition in experiment.conditions},
     )
+
+
+def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
+    """The level of each sweep at which all runs of a condition were trained, where that is one."""
+    levels: dict[str, set[float]] = {}
+    for job in jobs:
+        if job.name.partition("/")[0] == condition:
+            for sweep, level in job.trained_levels().items():
+                levels.setdefault(sweep, set()).add(level)
+    return {sweep: min(found) for sweep, found in levels.items() if len(found) == 1}
 
 
 def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> str:

@@ -19,15 +19,15 @@ def run(line: CommandLine) -> int:
     Raises:
         ExneatError: there is no such run, its settings cannot be read, or a setting makes no sense.
     """
-    plain = line.compose_only(("run", "generations", "task", "sweeps"), ("sweep", "executor"))
+    plain = line.compose_only(("run", "generations", "tracker", "task", "sweeps"), ("sweep", "executor"))
     check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
     name_code(line, plain)
     directory = RunDirectory(check_path("run", plain["run"], "a run directory"))
     settings = read_settings(directory)
     path = directory.path.absolute()
     settings = replace(settings, resume=True, name=path.parent.name, output=str(directory.path.parent.parent))
-    if plain["generations"] is not None:
-        settings = replace(settings, generations=plain["generations"])
+    asked = {key: plain[key] for key in ("generations", "tracker") if plain[key] is not None}
+    settings = replace(settings, **asked)
     if "executor" in plain:
         settings = replace(settings, executor=build(Executor, plain["executor"], "executor."))
     if settings.directory.path.absolute() != path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import platform
 import subprocess
@@ -16,8 +17,13 @@ _PACKAGES = ("neat-python", "numpy", "numba", "gymnasium", "mujoco", "hydra-core
 
 def versions() -> dict[str, str]:
     """Versions of exneat, Python and the libraries that results depend on."""
-    packages = {package: version(package) for package in _PACKAGES}
+    packages = {package: _version(package) for package in _PACKAGES}
     return {"exneat": exneat_cli.__version__, "python": platform.python_version(), **packages}
+
+
+@functools.cache
+def _version(package: str) -> str:
+    return version(package)  # which reads a file
 
 
 def processor() -> str:

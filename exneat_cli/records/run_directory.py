@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
@@ -32,7 +32,7 @@ from exneat_cli.records.manifest import (
 )
 from exneat_cli.records.plain import read_json, read_yaml
 
-_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "generations")
+_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
 _TRIES, _PAUSE = 3, 0.02
@@ -284,10 +284,24 @@ class RunDirectory:
         write_json(self.manifest, msgspec.structs.replace(self.read_manifest(), **changes))
 
 
-def find_runs(output: Path) -> list[RunDirectory]:
-    """Every run below an output root, or in one of its folders, or the run that it is; in alphabetical order."""
-    places = (glob(f"{'*/' * depth}manifest.json", root_dir=output) for depth in (0, 1, 2))
-    return [RunDirectory((output / manifest).parent) for found in places for manifest in sorted(found)]
+def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None) -> list[RunDirectory]:
+    """Every run below an output root, or in one of its folders, or the run that it is; in alphabetical order.
+
+    `unreadable` is told of each folder that cannot be read; what is not there has no runs.
+    """
+
+    def tell(error: OSError) -> None:
+        if unreadable and error.errno not in (errno.ENOENT, errno.ENOTDIR):
+            unreadable(error)
+
+    found: list[tuple[int, Path]] = []
+    for place, folders, files in os.walk(output, onerror=tell, followlinks=True):
+        path = Path(place)
+        depth = len(path.relative_to(output).parts)
+        folders[:] = [name for name in folders if depth < 2 and not name.startswith(".")]
+        if "manifest.json" in files:
+            found.append((depth, path))
+    return [RunDirectory(path) for _, path in sorted(found)]
 
 
 def runs_at(pattern: Path) -> list[RunDirectory]:

@@ -29,6 +29,7 @@ from exneat_cli.rollouts import Runner, keep_workers
 from exneat_cli.runs.progress import Progress
 from exneat_cli.runs.scores import choose_champion, measure_baseline, summary_sentence
 from exneat_cli.runs.settings import RunSettings
+from exneat_cli.runs.trackers import Tracking, check_trackers, tracked
 from exneat_cli.runs.training import Training
 from exneat_cli.seeding import STREAMS
 from exneat_cli.tasks.contract import check_worlds
@@ -46,16 +47,23 @@ class Finished:
 
 @keep_workers()
 def train(
-    settings: RunSettings, *, progress: Progress | None = None, command: Sequence[str] = (), go_on: bool = False
+    settings: RunSettings,
+    *,
+    progress: Progress | None = None,
+    command: Sequence[str] = (),
+    go_on: bool = False,
+    tracking: Tracking | None = None,
 ) -> Finished:
     """Do one run, or find it done; nothing is shown without `progress`, and `command` is for the manifest.
 
-    An unfinished run is gone on with if `go_on` or `settings.resume`, which alone makes a finished one longer.
+    An unfinished run is gone on with if `go_on` or `settings.resume`, which alone makes a finished one longer. Whoever
+    gives the settings' trackers as `tracking` may tell them more, and closes them.
 
     Raises:
         ExneatError: the directory is unusable or holds something else, or no team survived.
     """
     settings.executor.check_installed()
+    check_trackers(settings.trackers)
     check_worlds(settings.task)  # before anything is written
     progress = progress or Progress()
     directory = settings.directory
@@ -65,19 +73,26 @@ def train(
         _refuse_changed_files(settings, asked)
     with directory.claimed(settings.full_hash, asked, resume=resume, lengthen=settings.resume) as was_done:
         if not was_done:
-            with _recorded(directory, settings, progress, command):
+            with (
+                _recorded(directory, settings, progress, command),
+                contextlib.nullcontext(tracking) if tracking else tracked(settings.trackers) as told,
+            ):
                 if settings.algorithm.rule:
+                    told.begin(directory, settings.to_plain(), ())
                     result = measure_baseline(settings, directory)
                 else:
                     checkpoints = read_checkpoints(directory.path, settings.full_hash)
                     training = Training.resumed(settings, checkpoints, progress.say)
+                    told.begin(directory, settings.to_plain(), training.history)
                     with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
                         while not training.is_over:
                             training.advance(runner)
                             _save(directory, training)
                             progress.generation(training.history[-1])
+                            told.generation(training.history[-1])
                     result = choose_champion(training, directory, progress)
                 directory.update_manifest(status=DONE, finished=_now(), result=result)
+                told.result(result)
         result = directory.read_result()
     summary = summary_sentence(settings.task, result) + _told_of_backend(settings, result)
     return Finished(directory, result, summary, trained_now=not was_done)

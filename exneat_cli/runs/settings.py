@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +23,7 @@ from exneat_cli.algorithms import (
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_path, check_section, check_whole
 from exneat_cli.records import RunDirectory, build, configuration_hash
 from exneat_cli.rollouts import Executor, Noise
+from exneat_cli.runs.trackers import TRACKERS
 from exneat_cli.tasks import TASKS, AntTask, HasBatch, HasInitialPose, Task
 from exneat_cli.tasks.contract import check_description, is_ours
 from exneat_cli.tasks.user_code import find_task
@@ -73,6 +74,7 @@ class RunSettings:
         output: root of all run directories; a leading ``~`` is the home directory.
         resume: go on with an unfinished run, or make a finished one longer.
         checkpoint_every: generations from one checkpoint to the next.
+        tracker: of `TRACKERS`, one or several, that are told of the run; without effect on results.
         task_kind: ``package.module:Class`` of the task if that is how its user names it, else None; plain data has it
             as ``task.kind``.
 
@@ -101,6 +103,7 @@ class RunSettings:
     output: str = "outputs"
     resume: bool = False
     checkpoint_every: int = 1
+    tracker: str | Sequence[str] = "none"
     task_kind: str | None = None
 
     def __post_init__(self) -> None:
@@ -121,6 +124,8 @@ class RunSettings:
         check_whole("test_episodes", self.test_episodes, 1)
         check_flag("resume", self.resume)
         check_whole("checkpoint_every", self.checkpoint_every, 1)
+        for name in [self.tracker] if isinstance(self.tracker, str) else self.tracker:
+            check_choice("tracker", name, ("none", *TRACKERS))
         output = check_path("output", self.output, "a directory, without control characters")
         object.__setattr__(self, "output", str(output))
         if self.name is not None and (not isinstance(self.name, str) or not _NAME.fullmatch(self.name)):
@@ -190,6 +195,12 @@ class RunSettings:
     def wants_moments(self) -> bool:
         """Whether the algorithm is told the statistics of what networks sense."""
         return self.algorithm.wants_moments(self.evolution)
+
+    @property
+    def trackers(self) -> tuple[str, ...]:
+        """The trackers by name, each once."""
+        names = (self.tracker,) if isinstance(self.tracker, str) else self.tracker
+        return tuple(dict.fromkeys(name for name in names if name != "none"))
 
     @property
     def trained_generations(self) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import matplotlib.image
 import numpy as np
@@ -152,3 +153,8 @@ def has_white_edges(path: Path) -> bool:
     picture = matplotlib.image.imread(path)[..., :3]
     edges = [picture[:1], picture[-1:], picture[:, :1], picture[:, -1:]]
     return all(np.all(edge == 1.0) for edge in edges)
+
+
+def texts_of(path: Path) -> list[str]:
+    """The texts in an SVG, which are texts there and no outlines."""
+    return [str(element.text) for element in ElementTree.parse(path).iter("{http://www.w3.org/2000/svg}text")]

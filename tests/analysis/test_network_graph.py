@@ -15,7 +15,17 @@ from matplotlib.patches import Ellipse, FancyArrowPatch
 
 from exneat_cli.analysis import network_graph
 from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
-from exneat_cli.analysis.network_layout import depths, edges_of, hidden_of, lay_out, links_of, natural_size, used_nodes
+from exneat_cli.analysis.network_layout import (
+    MOST_EDGES,
+    depths,
+    edges_of,
+    hidden_of,
+    lay_out,
+    links_of,
+    natural_size,
+    strongest_edges,
+    used_nodes,
+)
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory, write_json
 from exneat_cli.records.champion import Champion
@@ -154,7 +164,7 @@ def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_th
 def test_inputs_that_are_too_many_to_be_named_are_counted() -> None:
     body = a_module("body", (0.0, 0.0), 0, pins=[reads(k) for k in range(200)], outputs=1, drives=[0])
     axes = axes_of(champion_of(a_champion([body], [a_genome([0], [(-1, 0, 1.0)])], ["hip"], 200)))
-    assert {text.get_text() for text in axes.texts} == {"body", "hip", "200 sensors"}
+    assert {text.get_text() for text in axes.texts} == {"body", "hip", "200 eye (cd)"}
 
 
 def test_the_legend_speaks_of_links_and_loops_only_where_there_are_any() -> None:
@@ -197,3 +207,21 @@ def test_a_missing_or_damaged_champion_is_refused_in_one_line(tmp_path: Path) ->
 
 def test_no_two_modules_of_a_body_have_one_colour() -> None:
     assert len({network_graph._colour(m) for m in range(24)}) == 24
+
+
+def test_many_sensors_stand_by_quantity_and_of_many_connections_the_strongest_are_drawn() -> None:
+    quantities = ("velocity x (m/s)", "contact force, left (N)", "angle (rad)")
+    names = [f"leg {k} {quantity}" for k in range(30) for quantity in quantities]
+    connections = [(-1 - k, output, 0.01 * (1 + k + 90 * output)) for k in range(90) for output in range(4)]
+    body = a_module("body", (0.0, 0.0), 0, pins=[reads(k) for k in range(90)], outputs=4, drives=[0, 1, 2, 3])
+    content = a_champion([body], [a_genome(range(4), connections)], ["a", "b", "c", "d"], 90)
+    champion = champion_of({**content, "sensors": names})
+    axes = Figure().add_subplot()
+    draw_champion(axes, champion, 12.0, 6.0)
+    words = [text.get_text() for text in axes.texts]
+    assert {"30 velocity (m/s)", "30 force (N)", "30 angle (rad)"} <= set(words)
+    assert not set(names) & set(words)
+    (lines,) = (each for each in axes.collections if isinstance(each, LineCollection))
+    assert len(lines.get_segments()) == MOST_EDGES
+    assert "left out: the 110 weakest connections" in [entry.get_label() for entry in legend_entries([champion])]
+    assert min(abs(weight) for _, _, weight in strongest_edges(champion)) == pytest.approx(0.01 * 111)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +18,18 @@ from msgspec.structs import replace as changed
 from exneat_cli.analysis.catalogue import FIGURE_KINDS, FigurePlan, Panel
 from exneat_cli.analysis.report_figures import common_curves, draw_figure, draw_panel
 from exneat_cli.analysis.study import MissingRunsError, Study
+from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.errors import ExneatError
-from tests.analysis.fake_studies import LEVELS, SWEEPS, a_study, contents, finish_all, has_white_edges, plan_study
+from tests.analysis.fake_studies import (
+    LEVELS,
+    SWEEPS,
+    a_study,
+    contents,
+    finish_all,
+    has_white_edges,
+    plan_study,
+    texts_of,
+)
 
 TRAINED, SWEPT = Panel("track", "calm"), Panel("track", "calm", sweep="sensor_noise")
 PANELS = {
@@ -48,7 +59,7 @@ def without(study: Study, variant: str) -> Study:
 def test_equal_data_in_two_places_gives_equal_bytes_and_nothing_is_cut_off(tmp_path: Path, kind: str) -> None:
     for place in ("a", "b"):
         built = draw_figure(a_plan(kind), {"track": a_study(tmp_path / place, seeds=6)}, tmp_path / place / "report")
-        assert [path.name for path in built.paths] == [f"figure-4.3-{kind}.5.png", f"figure-4.3-{kind}.5.svg"]
+        assert [path.name for path in built.paths] == [f"figure-4.3-{kind}.5.{of}" for of in ("png", "svg", "pdf")]
         assert has_white_edges(built.paths[0])
     assert contents(tmp_path / "a" / "report") == contents(tmp_path / "b" / "report")
 
@@ -74,7 +85,8 @@ def test_training_can_be_drawn_over_each_measure_of_effort(tmp_path: Path) -> No
     for axis, label in labels.items():
         said = caption(a_plan("training"), a_study(tmp_path / axis), tmp_path, axis)
         assert ("latest value" in said) == (axis != "generation")
-        assert f"<!-- {label}" in (tmp_path / "report" / "figure-4.3-training.5.svg").read_text()
+        drawn = texts_of(tmp_path / "report" / "figure-4.3-training.5.svg")
+        assert any(text.startswith(label) for text in drawn)
     with pytest.raises(ExneatError, match="axis: expected one of generation, episodes, env_steps, got 'hours'"):
         caption(a_plan("training"), a_study(tmp_path), tmp_path, "hours")
 
@@ -200,6 +212,14 @@ def test_the_dashed_line_is_the_mean_of_the_five_runs_best_on_validation_unless_
         np.testing.assert_allclose(line.get_ydata(), fading * (0.3 + 0.013 * np.mean([2, 3, 4, 5, 6])))
 
 
+def test_the_level_of_training_is_marked(tmp_path: Path) -> None:
+    study = a_study(tmp_path)
+    assert "as in training" not in [line.get_label() for line in drawn(study, "robustness")[0].get_lines()]
+    trained = replace(study, trained={key: {"sensor_noise": 0.1, "gap": 0.2} for key in study.conditions})
+    (mark,) = (line for line in drawn(trained, "robustness")[0].get_lines() if line.get_label() == "as in training")
+    assert set(mark.get_xdata()) == {0.1}
+
+
 def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(tmp_path: Path) -> None:
     study = a_study(tmp_path, has_full_reward=True)
     panels = [changed(SWEPT, value=value, highest=0.3) for value in ("fitness", "full_reward")]
@@ -245,6 +265,28 @@ def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_pat
 def test_labels_of_users_are_shown_as_they_are(tmp_path: Path, kind: str) -> None:
     labels = {"neat": "_NEAT", "exneat": r"$\foo$ $$ 5%", "random": "__$"}
     draw_figure(a_plan(kind), {"track": a_study(tmp_path, variants=labels)}, tmp_path / "report")
-    drawn = (tmp_path / "report" / f"figure-4.3-{kind}.5.svg").read_text()
+    drawn = texts_of(tmp_path / "report" / f"figure-4.3-{kind}.5.svg")
     for variant, label in labels.items():
-        assert (f"<!-- {label} -->" in drawn) == (variant != "random" or kind in ("robustness", "cluster"))
+        assert (label in drawn) == (variant != "random" or kind in ("robustness", "cluster"))
+
+
+@pytest.mark.parametrize(("columns", "width"), [(1, 3.5), (2, 7.16)])
+def test_a_figure_for_paper_is_as_wide_as_its_columns_has_no_title_and_nothing_is_cut_off(
+    tmp_path: Path, columns: int, width: float
+) -> None:
+    study = {"track": a_study(tmp_path, seeds=6)}
+    for kind in ("training", "robustness", "cluster"):
+        picture, drawing, _ = draw_figure(a_plan(kind), study, tmp_path / "report", paper=Paper(columns)).paths
+        assert has_white_edges(picture)
+        assert f"Made up, {kind}" not in texts_of(drawing)
+        size = re.search(r'width="([\d.]+)pt"', drawing.read_text())
+        assert size is not None
+        assert float(size[1]) == pytest.approx(72 * width)
+
+
+def test_what_a_style_sheet_says_counts_more(tmp_path: Path) -> None:
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.size: 13  # large\naxes.titlesize: medium\n\n# a comment\naxes.grid: False\n")
+    paper = Paper(2, read_style_sheet(sheet))
+    drawing = draw_figure(a_plan("training"), {"track": a_study(tmp_path)}, tmp_path / "report", paper=paper).paths[1]
+    assert "font-size: 13px" in drawing.read_text()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
 from exneat_cli.records import UNPERTURBED, RobustnessRow, RunDirectory, merge_robustness, write_csv, write_history
-from tests.analysis.fake_studies import contents, has_white_edges, history_row
+from tests.analysis.fake_studies import contents, has_white_edges, history_row, texts_of
 
 
 def labels(count: int) -> dict[str, str]:
@@ -46,7 +45,7 @@ def test_the_same_data_gives_the_same_bytes_and_nothing_is_cut_off(tmp_path: Pat
     written = draw_all(one)
     assert [path.stem for path in written] == ["training"] * 2 + ["path"] * 2 + ["robustness"] * 2
     assert all(has_white_edges(path) for path in written if path.suffix == ".png")
-    assert "training fitness (forward reward)" in (one.plots / "training.svg").read_text()
+    assert "training fitness (forward reward)" in texts_of(one.plots / "training.svg")
     draw_all(other)
     assert contents(one.plots) == contents(other.plots)
 
@@ -59,14 +58,14 @@ def test_a_run_of_a_single_generation_can_be_drawn(tmp_path: Path) -> None:
 def test_robustness_has_a_panel_for_each_sweep_and_none_for_the_unperturbed_row(tmp_path: Path, count: int) -> None:
     picture, drawing = draw_robustness(a_run(tmp_path / "run", sweeps=count), labels(count), "forward reward")
     assert has_white_edges(picture)
-    text = drawing.read_text()
-    assert [label for label in labels(9).values() if f"<!-- {label} -->" in text] == list(labels(count).values())
-    assert text.count("<!-- forward reward -->") == count
-    assert "<!-- none -->" not in text
+    texts = texts_of(drawing)
+    assert [label for label in labels(9).values() if label in texts] == list(labels(count).values())
+    assert texts.count("forward reward") == count
+    assert "none" not in texts
 
 
 def test_without_labels_sweeps_are_called_by_their_names(tmp_path: Path) -> None:
-    assert "<!-- sweep_0 -->" in draw_robustness(a_run(tmp_path / "run"), {}, "fitness")[1].read_text()
+    assert "sweep_0" in texts_of(draw_robustness(a_run(tmp_path / "run"), {}, "fitness")[1])
 
 
 def test_a_run_that_was_never_swept_has_no_picture_of_robustness(tmp_path: Path) -> None:
@@ -83,20 +82,15 @@ def test_of_a_level_that_was_tested_twice_the_longer_test_is_shown(tmp_path: Pat
     assert contents(once.plots) == contents(twice.plots)
 
 
-def texts(path: Path) -> list[str]:
-    """The texts of an SVG, which matplotlib writes as comments beside their outlines."""
-    return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
-
-
 def test_figures_say_what_their_marks_mean_and_what_the_run_is(tmp_path: Path) -> None:
     run = a_run(tmp_path / "hunting" / "exneat-all-none-s3-0a1b2c", place="tiles")
     training, path = draw_training(run, "fitness")[1], draw_path(run)[1]
     robustness = draw_robustness(run, labels(1), "fitness", {"sweep_0": 0.5})[1]
     for figure in (training, path, robustness):
-        assert any("hunting, exneat-all-none, seed 3" in text for text in texts(figure))
-        assert not any("0a1b2c" in text for text in texts(figure))
-    assert "training fitness" in texts(training)
-    assert {"prey", "prey, caught here", "goal", "agent", "start", "end"} <= set(texts(path))
-    assert texts(path).count("cue at the end") == 1
-    assert "as in training" in texts(robustness)
-    assert "as in training" not in texts(draw_robustness(run, labels(1), "fitness")[1])
+        assert any("hunting, exneat-all-none, seed 3" in text for text in texts_of(figure))
+        assert not any("0a1b2c" in text for text in texts_of(figure))
+    assert "training fitness" in texts_of(training)
+    assert {"prey", "prey, caught here", "goal", "agent", "start", "end"} <= set(texts_of(path))
+    assert texts_of(path).count("cue at the end") == 1
+    assert "as in training" in texts_of(robustness)
+    assert "as in training" not in texts_of(draw_robustness(run, labels(1), "fitness")[1])

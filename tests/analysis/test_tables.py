@@ -110,7 +110,7 @@ def test_csv_keeps_every_digit_where_markdown_rounds_and_zero_has_no_sign(tmp_pa
         finish(run_of(study, "calm", variant, 0), (end,), test=end / 1000)
     table = built(study, tmp_path, PLAIN)
     assert [row[4] for row in table.rows] == ["812.3", "0.812", "1", "0.0", "0.000", ">1"]
-    exact, readable = (path.read_text() for path in table.paths)
+    exact, readable, _ = (path.read_text() for path in table.paths)
     assert ",-0.0111," in exact
     assert "| 0.0 |" in readable
 
@@ -202,7 +202,7 @@ def test_every_table_of_the_catalogue_can_be_built_and_keeps_what_was_published(
 
 def test_every_variant_is_compared_in_every_condition(tmp_path: Path) -> None:
     table = build_comparison(finish_all(plan_study(tmp_path)), tmp_path / "report")
-    assert [path.name for path in table.paths] == ["comparison-track.csv", "comparison-track.md"]
+    assert [path.name for path in table.paths] == [f"comparison-track.{kind}" for kind in ("csv", "md", "tex")]
     assert {len(row) for row in table.rows} == {len(table.header)}
     assert [row[:3] for row in table.rows] == [
         (condition, variant, runs)

@@ -44,14 +44,13 @@ def test_an_environment_is_trained_resumed_to_the_same_bytes_evaluated_and_repor
     common = ["train", *SMALL, f"task.env_id={env_id}", *ENVIRONMENTS[env_id]]
     assert main([*common, "generations=3", "executor=serial", f"output={tmp_path / 'serial'}"]) == 0
     assert "plain Python, which is slower" in capsys.readouterr().out
-    expected = results(tmp_path / "serial")
-    for workers in (1, 2):
-        output = tmp_path / f"processes{workers}"
-        assert main([*common, "generations=2", f"executor.workers={workers}", f"output={output}"]) == 0
-        assert main([*common, "generations=3", f"executor.workers={workers}", f"output={output}", "resume=true"]) == 0
-        assert yaml.safe_load(the_run(output).config.read_text())["executor"]["name"] == "processes"
-        assert not difference(results(output), expected)
-    run = the_run(tmp_path / "processes2")
+    expected, output = results(tmp_path / "serial"), tmp_path / "processes"
+    workers = 1 if env_id.startswith("Pendulum") else 2
+    assert main([*common, "generations=2", f"executor.workers={workers}", f"output={output}"]) == 0
+    assert main([*common, "generations=3", f"executor.workers={workers}", f"output={output}", "resume=true"]) == 0
+    assert yaml.safe_load(the_run(output).config.read_text())["executor"]["name"] == "processes"
+    assert not difference(results(output), expected)
+    run = the_run(output)
     sweep = ["sweep=sensor_noise", "sweep.levels=[0,0.5]", "sweep.episodes=2"]
     assert main(["evaluate", f"run={run.path}", *sweep, "executor.workers=2"]) == 0
     assert main(["evaluate", f"run={the_run(tmp_path / 'serial').path}", *sweep, "executor=serial"]) == 0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
 from exneat_cli.commands.command_line import shipped_directory
-from exneat_cli.commands.sweep import experiment_names, read_experiment
+from exneat_cli.commands.sweep import Experiment, experiment_names, read_experiment
 from exneat_cli.main import main
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
@@ -24,14 +26,24 @@ IDS = [
 
 
 @pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All experiments at smoke size."""
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """All experiments at smoke size, with short episodes on Ant for as long as these tests run."""
     output = tmp_path_factory.mktemp("smoke") / "outputs"
-    with pytest.MonkeyPatch.context() as patch:  # the figures of single runs are not looked at here, and slow
-        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
-        for name in experiment_names():
-            assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
-    return output
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("sweep", "report"):
+            patch.setattr(f"exneat_cli.commands.{module}.read_experiment", shortened)
+        with pytest.MonkeyPatch.context() as meanwhile:  # the figures of single runs are not looked at here, and slow
+            meanwhile.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+            for name in experiment_names():
+                assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
+        yield output
+
+
+def shortened(name: object) -> Experiment:
+    experiment = read_experiment(name)
+    if experiment.settings.get("task") != "ant":
+        return experiment
+    return replace(experiment, settings={**experiment.settings, "task.max_steps": 50})
 
 
 def report(output: Path, *arguments: str) -> int:
@@ -46,7 +58,7 @@ def test_the_catalogue_has_every_figure_and_table_of_the_thesis_and_ours() -> No
     assert sorted(CATALOGUE) == sorted(IDS)
 
 
-def test_every_id_builds_from_smoke_runs_and_a_second_report_leaves_the_same_bytes(
+def test_every_id_builds_from_smoke_runs_which_stay_as_they_are(
     outputs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = contents(outputs)
@@ -54,13 +66,19 @@ def test_every_id_builds_from_smoke_runs_and_a_second_report_leaves_the_same_byt
     shown = capsys.readouterr()
     made = contents(outputs / "report")
     for name in IDS:
-        kinds = ("csv", "md") if name.startswith("table") else ("png", "svg")
+        kinds = ("csv", "md", "tex") if name.startswith("table") else ("png", "svg", "pdf")
         assert {f"{name}.{kind}" for kind in kinds} <= set(made), f"{name}: {shown.err}"
     assert "index.html" in made
     assert "0 lack runs" in shown.out
-    assert report(outputs) == 0
-    assert contents(outputs / "report") == made
     assert {path: data for path, data in contents(outputs).items() if not path.startswith("report")} == before
+
+
+def test_a_second_report_leaves_the_same_bytes(outputs: Path) -> None:
+    assert report(outputs, "experiment=general_maze") == 0
+    made = contents(outputs / "report" / "general_maze")
+    assert {"index.html", "figure-4.5.svg", "figure-4.6.png", "table-5.2.csv"} <= set(made)
+    assert report(outputs, "experiment=general_maze") == 0
+    assert contents(outputs / "report" / "general_maze") == made
 
 
 def test_one_thing_alone_is_built_and_its_axis_can_be_chosen(outputs: Path, tmp_path: Path) -> None:
@@ -68,9 +86,13 @@ def test_one_thing_alone_is_built_and_its_axis_can_be_chosen(outputs: Path, tmp_
     shutil.copytree(outputs / "track_maze-noise_0.05-smoke", copy / "track_maze-noise_0.05-smoke")
     assert report(copy, "only=figure-4.1") == 0
     by_generation = contents(copy / "report")
-    assert sorted(by_generation) == ["figure-4.1.png", "figure-4.1.svg"]
+    assert sorted(by_generation) == ["figure-4.1.pdf", "figure-4.1.png", "figure-4.1.svg"]
     assert report(copy, "only=figure-4.1", "axis=env_steps") == 0
     assert contents(copy / "report")["figure-4.1.svg"] != by_generation["figure-4.1.svg"]
+    sheet = tmp_path / "mine.mplstyle"
+    sheet.write_text("font.size: 7")
+    assert report(copy, "only=figure-4.1", "columns=1", f"style={sheet}") == 0
+    assert b"font-size: 7px" in contents(copy / "report")["figure-4.1.svg"]
 
 
 def test_what_is_missing_is_named_with_the_command_that_makes_it_and_the_rest_is_built(

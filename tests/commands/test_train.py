@@ -264,7 +264,7 @@ def test_help_imports_nothing_heavy_and_shows_every_setting_with_its_meaning(com
         shown = re.sub(r"\s+", " ", done.stdout)
         for line in shown_settings(command):
             assert line in shown
-        assert ("seed=0" in shown) == (command in ("train", "sweep"))
+        assert ("seed=0" in shown) == (command in ("train", "sweep", "search"))
         assert "${" not in shown
     else:
         assert all(f"\n  {name} " in done.stdout for name in COMMANDS)
@@ -284,6 +284,7 @@ def shown_settings(command: str) -> list[str]:
         "train": [*of_runs, "sweep=none "],
         "resume": ["run=null a run directory", "task.kind=null", "generations=null"],
         "sweep": ["experiment=null ant, track_maze", *of_runs],
+        "search": ["space=null mutation, or", "trials=20 how many", *of_runs],
         "evaluate": ["run=null a run directory", "sweep.episodes=100 test episodes", "executor=null threads"],
         "report": ["budget=null whose runs", "axis=generation horizontal axis"],
         "watch": ["run=null ", "panel=null ", "level=null "],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -66,6 +67,27 @@ def test_a_run_is_finished_if_it_is_done_and_the_one_that_is_meant(tmp_path: Pat
     assert not run.is_finished()
     assert not RunDirectory(tmp_path / "nowhere").is_finished()
     assert find_runs(tmp_path) == [run]
+
+
+def test_folders_that_cannot_be_read_are_told_and_the_others_searched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for place in ("a/deep/er", "b/two", "b/one", ".hidden/run", "top"):
+        (tmp_path / place).mkdir(parents=True)
+        (tmp_path / place / "manifest.json").touch()
+    (tmp_path / "closed").mkdir()
+
+    def scan(path: str) -> Any:
+        if Path(path).name == "closed":  # what a superuser may read all the same
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return scandir(path)
+
+    scandir, told = os.scandir, []
+    monkeypatch.setattr("os.scandir", scan)
+    assert [run.path for run in find_runs(tmp_path, told.append)] == [tmp_path / p for p in ("top", "b/one", "b/two")]
+    assert [error.filename for error in told] == [str(tmp_path / "closed")]
+    assert find_runs(tmp_path / "nowhere", told.append) == find_runs(tmp_path / "closed") == []
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize("status", ["running", "failed", "interrupted"])

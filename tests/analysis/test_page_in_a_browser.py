@@ -1,0 +1,68 @@
+"""The page of a report in headless Chromium: sorted, filtered, narrow, and asking the network for nothing."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.analysis.test_index_page import a_report
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+TRIAL = """
+<script>
+const table = document.querySelector("#comparison-track + .scroll table");
+const column = (k) => [...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => row.cells[k].textContent);
+const training = [...table.tHead.rows[0].cells].findIndex((cell) => cell.textContent === "training");
+const before = column(1);
+const click = () => table.tHead.rows[0].cells[training].querySelector("button").click();
+click();
+const up = column(training);
+click();
+const down = column(training);
+click();
+const after = column(1);
+const box = [...document.querySelectorAll("#filter label")].find((label) => label.textContent.trim() === "ExNEAT");
+box.querySelector("input").click();
+document.body.dataset.found = JSON.stringify({
+  before, up, down, after, filtered: column(1),
+  asked: performance.getEntriesByType("resource").map((entry) => entry.name.slice(0, 5)),
+  width: document.documentElement.scrollWidth, room: innerWidth,
+});
+</script>
+"""
+
+
+def tried(page: Path) -> tuple[dict[str, Any], str]:
+    """What the trial found in a window of 400 pixels, and what the browser complained of."""
+    assert BROWSER is not None
+    page.write_text(page.read_text().replace("</body>", f"{TRIAL}</body>"))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=400,800", "--enable-logging=stderr"]
+    command = [BROWSER, *flags, f"--user-data-dir={page.parent / 'profile'}", "--dump-dom", page.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    found = re.search(r'data-found="([^"]*)"', done.stdout)
+    assert found is not None, done.stdout[-1000:]
+    return json.loads(html.unescape(found[1])), "\n".join(
+        line for line in done.stderr.splitlines() if "CONSOLE" in line and "made up" not in line
+    )
+
+
+@pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed here")
+def test_tables_are_sorted_and_filtered_without_network_or_complaints_and_fit_a_narrow_window(tmp_path: Path) -> None:
+    found, complaints = tried(a_report(tmp_path))
+    numbers = [float(text) for text in found["up"] if text]
+    assert len(set(numbers)) > 1
+    assert numbers == sorted(numbers)
+    assert [float(text) for text in found["down"] if text] == sorted(numbers, reverse=True)
+    assert found["up"][-1] == found["down"][-1] == ""  # a baseline, which is not trained
+    assert found["before"] == found["after"] == ["NEAT", "ExNEAT", "random actions"] * 2
+    assert found["filtered"] == ["NEAT", "random actions"] * 2
+    assert not [kind for kind in found["asked"] if kind.startswith("http")]
+    assert found["width"] <= found["room"]
+    assert not complaints
