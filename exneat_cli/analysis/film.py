@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -90,6 +91,24 @@ def frame(stills: Sequence[Still]) -> Pixels:
     tiles += [nothing] * (-len(tiles) % columns)
     whole = np.concatenate([np.concatenate(tiles[k : k + columns], axis=1) for k in range(0, len(tiles), columns)])
     return np.ascontiguousarray(whole[: whole.shape[0] // 2 * 2, : whole.shape[1] // 2 * 2])
+
+
+def fitted(picture: Pixels, width: int, height: int) -> Pixels:
+    """(height, width, 3) the picture, as large as fits, in the middle of grey."""
+    if picture.shape[:2] == (height, width):
+        return picture
+    scale = min(width / picture.shape[1], height / picture.shape[0])
+    size = max(1, round(scale * picture.shape[1])), max(1, round(scale * picture.shape[0]))
+    whole = Image.new("RGB", (width, height), (235, 235, 235))
+    whole.paste(Image.fromarray(picture).resize(size), ((width - size[0]) // 2, (height - size[1]) // 2))
+    return np.asarray(whole)
+
+
+def as_jpeg(picture: Pixels) -> bytes:
+    """A picture as a file."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=85)
+    return file.getvalue()
 
 
 def _captioned(picture: Pixels, title: str, caption: str) -> Pixels:
