@@ -26,6 +26,8 @@ DPI, NATURAL = 100, 640
 """Pixels to an inch of networks, and the width in pixels below which they are drawn smaller as a whole."""
 SIZE, BAR = 15, 23
 """Pixels of the letters of titles and captions, smaller for long ones, and of the bars around pictures for them."""
+LEGEND_WIDTH = 380
+"""Pixels that the legend needs."""
 _LEGEND = "nodes: blue above 0, red below; full colour: the node's largest value so far"
 
 
@@ -47,7 +49,8 @@ class Panel:
             canvas = FigureCanvasAgg(figure)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - BAR / height))
             places = draw_still(axes, champion, *inches)
-            figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=7.5, va="center")
+            letters = 7.5 / scale * min(1.0, width / LEGEND_WIDTH)  # as large in small pictures, where it fits
+            figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=letters, va="center")
             canvas.draw()  # type: ignore[no-untyped-call]
             drawn = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         self._still = Image.fromarray(drawn[..., :3].copy())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory
 
-_PALETTE = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:diff_mode=rectangle"
+_PALETTE = "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
 VIDEO_FORMATS: dict[str, list[str]] = {
     "mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart"],
     "gif": ["-c:v", "gif", "-vf", _PALETTE],

@@ -159,7 +159,9 @@ def picture_of(env: gymnasium.Env[Any, Any], env_id: str) -> Snapshot:
     Raises:
         ExneatError: it cannot be drawn here, or gives no picture.
     """
+    # pygame greets on standard output, and looks for a screen that nobody needs.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pygame's, about libraries of its own
