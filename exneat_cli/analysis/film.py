@@ -26,7 +26,7 @@ DPI, NATURAL = 100, 640
 """Pixels to an inch of networks, and the width in pixels below which they are drawn smaller as a whole."""
 SIZE, BAR = 15, 23
 """Pixels of the letters of titles and captions, smaller for long ones, and of the bars around pictures for them."""
-LEGEND_WIDTH = 380
+LEGEND_WIDTH = 430
 """Pixels that the legend needs."""
 _LEGEND = "nodes: blue above 0, red below; full colour: the node's largest value so far"
 
