@@ -18,12 +18,12 @@ import pytest
 from PIL import Image
 
 import exneat_cli
+from exneat_cli.analysis.film import fitted
 from exneat_cli.commands import drawing, watch
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records.video import VIDEO_FORMATS
 from tests.commands.refusals import check_refusal
-from tests.tasks import environments  # noqa: F401  registers some
 
 FFMPEG = "pip install 'exneat[video]'"
 
@@ -37,9 +37,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["task=foraging", "task.steps=9"],
             ["task=foraging", "task.steps=9", "seed=1"],
             ["task=foraging", "algorithm=random"],
-            ["task=gym", "task.env_id=exneat-tests/Choosing-v0"],
-            ["task=gym", "task.env_id=exneat-tests/Choosing-v0", "task.kwargs={pictures: false}"],
-            ["task=gym", "task.env_id=exneat-tests/Bounded-v0"],
             ["task=ant", "task.max_steps=12"],
         ):
             assert main(["train", "budget=smoke", *settings, f"output={output}"]) == 0
@@ -48,10 +45,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run_of(runs: Path, pattern: str) -> Path:
     return next(iter(sorted(runs.glob(pattern))))
-
-
-def gym_run(runs: Path, setting: str) -> Path:
-    return next(each for each in sorted(runs.glob("gym/*")) if setting in (each / "config.yaml").read_text())
 
 
 def decoded(path: Path) -> list[np.ndarray]:
@@ -155,19 +148,11 @@ def test_a_film_that_ffmpeg_cannot_finish_leaves_what_was_there(
     check_refusal(arguments, ["film.mp4: could not be written: ffmpeg says"], tmp_path, capfd)
 
 
-def test_an_environment_of_gymnasium_plays_in_its_own_time_and_its_picture_keeps_its_shape(
-    runs: Path, tmp_path: Path
-) -> None:
-    pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
-    film = tmp_path / "film.gif"
-    size = ["width=160", "height=120", "workers=1", "panel=none", "fps=20", "format=gif", f"output={film}"]
-    run = gym_run(runs, "kwargs: {}")
-    assert main(["watch", f"run={run}", *size]) == 0
-    frames = decoded(film)
-    steps = len((run / "trace.csv").read_text().splitlines()) - 2
-    assert len(frames) == steps
-    rows, columns = np.nonzero((frames[0].astype(int) - (200, 0, 0)).__abs__().max(axis=-1) < 40)
-    assert (np.ptp(rows) + 1, np.ptp(columns) + 1) == (40, 160)
+def test_a_picture_of_any_shape_fits_in_without_being_stretched() -> None:
+    picture = fitted(np.full((20, 80, 3), (200, 0, 0), np.uint8), 160, 120)
+    rows, columns = np.nonzero((picture == (200, 0, 0)).all(axis=-1))
+    assert picture.shape == (120, 160, 3)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (40, 79, 0, 159)
 
 
 def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: Path) -> None:
@@ -239,8 +224,6 @@ def test_what_cannot_be_filmed_is_refused(
     (old / "champion.json").write_text((old / "champion.json").read_text().replace('"format": 3', '"format": 2'))
     for arguments, named in {
         f"run={run_of(runs, 'foraging/random-*')}": "has no champion: random is a baseline",
-        f"run={gym_run(runs, 'Bounded')}": "expected an environment with the render mode rgb_array, got none",
-        f"run={gym_run(runs, 'pictures: false')}": "expected a picture of (height, width, 3) bytes",
         f"run={old}": "expected format 3, got 2: another version of exneat",
         f"run={runs}/foraging/exneat-*": "output: expected a file, where several runs",
     }.items():
