@@ -52,9 +52,9 @@ reproduce: $(VENV)/installed ## train what is missing of all experiments, then r
 	@status=0; for experiment in $(EXPERIMENTS); do $(MAKE) --no-print-directory sweep-$$experiment || status=1; done; \
 	$(BIN)/exneat report budget=$(BUDGET) && exit $$status
 
-walking.gif: $(VENV)/installed ## six seconds of a champion for the README, at most 3 MB: make walking.gif RUN=outputs/ant/<run>
+walking.gif: $(VENV)/installed ## five seconds of a champion for the README, at most 3 MB: make walking.gif RUN=outputs/ant/<run>
 	@test -n "$(RUN)" || { echo "RUN=outputs/ant/<run> names the run"; exit 2; }
-	$(BIN)/exneat watch run=$(RUN) format=gif steps=120 width=360 height=270 output=docs/images/walking.gif
+	$(BIN)/exneat watch run=$(RUN) format=gif steps=100 width=360 height=270 output=docs/images/walking.gif
 	@test $$(wc -c < docs/images/walking.gif) -le 3000000 || { echo "docs/images/walking.gif is above 3 MB"; exit 1; }
 
 report: $(VENV)/installed ## every table and figure from the runs there are; trains nothing

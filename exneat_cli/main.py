@@ -8,6 +8,7 @@ import os
 import shlex
 import signal
 import sys
+import traceback
 from collections.abc import Sequence
 
 from exneat_cli import __version__
@@ -33,6 +34,9 @@ COMMANDS = {
 _RESUMABLE = "exneat: interrupted; to go on:"
 _MAKING_FILES = ("train", "resume", "sweep", "search", "evaluate", "report")
 """What these say is no result, and may get lost."""
+
+_GRAPHICS = {"egl": "libegl1 libopengl0 libgl1-mesa-dri", "osmesa": "libosmesa6"}
+"""Packages of Debian that each value of MUJOCO_GL needs."""
 
 HELP = """exneat trains and compares modular neuroevolution (NEAT and ExNEAT).
 
@@ -107,6 +111,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _ended_by(error, shlex.join(["exneat", command, *rest]))
 
 
+def _is_of_graphics(error: BaseException) -> bool:
+    """Whether PyOpenGL, which MuJoCo imports as MUJOCO_GL says, raised it: over a library that it lacks."""
+    frames = traceback.walk_tb(error.__traceback__)
+    return any(str(frame.f_globals.get("__name__")).startswith(("OpenGL", "mujoco.egl")) for frame, _ in frames)
+
+
 def _check_place() -> None:
     """Refuse to work in a directory that is gone, where no path leads anywhere."""
     try:
@@ -126,6 +136,9 @@ def _ended_by(error: BaseException, typed: str) -> int:
         return 128 + (signal_heard() or signal.SIGINT)
     if isinstance(error, ExneatError):
         message = str(error)
+    elif (library := os.environ.get("MUJOCO_GL")) and _is_of_graphics(error):
+        install = f"apt-get install {_GRAPHICS.get(library, 'its libraries')}"
+        message = f"MUJOCO_GL={library}: MuJoCo cannot load it: {error}\n  unset it, or {install}; see exneat doctor"
     elif isinstance(error, ImportError):
         message = f"{error}\n  python -m pip check says which libraries are missing or of another version"
     elif isinstance(error, RuntimeError) and "environment variable" in str(error):  # MuJoCo's own words

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -25,6 +26,8 @@ DPI, NATURAL = 100, 640
 """Pixels to an inch of networks, and the width in pixels below which they are drawn smaller as a whole."""
 SIZE, BAR = 15, 23
 """Pixels of the letters of titles and captions, smaller for long ones, and of the bars around pictures for them."""
+LEGEND_WIDTH = 430
+"""Pixels that the legend needs."""
 _LEGEND = "nodes: blue above 0, red below; full colour: the node's largest value so far"
 
 
@@ -46,7 +49,8 @@ class Panel:
             canvas = FigureCanvasAgg(figure)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - BAR / height))
             places = draw_still(axes, champion, *inches)
-            figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=7.5, va="center")
+            letters = 7.5 / scale * min(1.0, width / LEGEND_WIDTH)  # as large in small pictures, where it fits
+            figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=letters, va="center")
             canvas.draw()  # type: ignore[no-untyped-call]
             drawn = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         self._still = Image.fromarray(drawn[..., :3].copy())
@@ -90,6 +94,24 @@ def frame(stills: Sequence[Still]) -> Pixels:
     tiles += [nothing] * (-len(tiles) % columns)
     whole = np.concatenate([np.concatenate(tiles[k : k + columns], axis=1) for k in range(0, len(tiles), columns)])
     return np.ascontiguousarray(whole[: whole.shape[0] // 2 * 2, : whole.shape[1] // 2 * 2])
+
+
+def fitted(picture: Pixels, width: int, height: int) -> Pixels:
+    """(height, width, 3) the picture, as large as fits, in the middle of grey."""
+    if picture.shape[:2] == (height, width):
+        return picture
+    scale = min(width / picture.shape[1], height / picture.shape[0])
+    size = max(1, round(scale * picture.shape[1])), max(1, round(scale * picture.shape[0]))
+    whole = Image.new("RGB", (width, height), (235, 235, 235))
+    whole.paste(Image.fromarray(picture).resize(size), ((width - size[0]) // 2, (height - size[1]) // 2))
+    return np.asarray(whole)
+
+
+def as_jpeg(picture: Pixels) -> bytes:
+    """A picture as a file."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=85)
+    return file.getvalue()
 
 
 def _captioned(picture: Pixels, title: str, caption: str) -> Pixels:

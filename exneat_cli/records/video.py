@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import subprocess
+import tempfile
+from collections.abc import Generator
+from contextlib import closing, suppress
+from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +16,11 @@ from numpy.typing import NDArray
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory
 
-_PALETTE = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:diff_mode=rectangle"
-VIDEO_FORMATS: dict[str, dict[str, Any]] = {
-    "mp4": {"codec": "libx264", "output_params": ["-crf", "23", "-movflags", "+faststart"]},
-    "gif": {"codec": "gif", "pix_fmt_out": "rgb8", "output_params": ["-vf", _PALETTE, "-pix_fmt", "pal8"]},
-    "webp": {"codec": "libwebp_anim", "output_params": ["-loop", "0", "-quality", "70"]},
+_PALETTE = "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
+VIDEO_FORMATS: dict[str, list[str]] = {
+    "mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart"],
+    "gif": ["-c:v", "gif", "-vf", _PALETTE],
+    "webp": ["-c:v", "libwebp_anim", "-loop", "0", "-quality", "70"],
 }
 """How ffmpeg encodes each format."""
 
@@ -31,48 +34,71 @@ def check_video_library() -> None:
     _ffmpeg()
 
 
-def _ffmpeg() -> Any:
+def _ffmpeg() -> str:
+    """The path of the program."""
     try:
         import imageio_ffmpeg
 
-        imageio_ffmpeg.get_ffmpeg_exe()
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError) as error:
         raise ExneatError(f"expected ffmpeg by imageio-ffmpeg, got: {error}\n  pip install 'exneat[video]'") from error
-    return imageio_ffmpeg
 
 
-def write_video(path: Path, frames: Iterator[NDArray[np.uint8]], fps: float, form: str) -> int:
+def write_video(path: Path, frames: Generator[NDArray[np.uint8]], fps: float, form: str) -> int:
     """Write frames, (height, width, 3) each, of a format in `VIDEO_FORMATS`; returns how many there were.
 
     Raises:
-        ExneatError: ffmpeg is not there, or the file cannot be written; what was there before stays.
+        ExneatError: ffmpeg is not there or failed, or the file cannot be written; what was there before stays.
     """
-    library, count = _ffmpeg(), 0
+    program = _ffmpeg()
     make_directory(path.parent)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    writer = None
     try:
-        temporary.touch()
-        for picture in frames:
-            if writer is None:
-                size = picture.shape[1], picture.shape[0]
-                options = {"fps": fps, "macro_block_size": 2, "ffmpeg_log_level": "quiet", **VIDEO_FORMATS[form]}
-                options["output_params"] = [*options["output_params"], "-f", form]
-                writer = library.write_frames(str(temporary), size, **options)
-                writer.send(None)
-            writer.send(np.ascontiguousarray(picture))
-            count += 1
-        if writer is not None:
-            writer.close()
-            writer = None
-        if not temporary.stat().st_size:
-            raise OSError(None, "ffmpeg wrote nothing")
+        temporary.touch()  # refused before anything is drawn
+        with closing(frames):
+            count = _encode(program, frames, fps, form, temporary)
         temporary.replace(path)
     except OSError as error:
-        why = error.strerror or " ".join(str(error).split())[:200]
-        raise ExneatError(f"{path}: could not be written: {why}; check the disk and output=") from error
+        raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+    except _EncodingError as error:
+        fix = "check the disk, or pip install --force-reinstall imageio-ffmpeg"
+        raise ExneatError(f"{path}: could not be written: ffmpeg says: {error}\n  {fix}") from error
     finally:
-        if writer is not None:
-            writer.close()
         delete(temporary)
+    return count
+
+
+class _EncodingError(Exception):
+    """What ffmpeg said when it failed."""
+
+
+def _encode(program: str, frames: Generator[NDArray[np.uint8]], fps: float, form: str, path: Path) -> int:
+    """Pipe frames, at least one, through ffmpeg into a file; returns how many there were."""
+    first = next(frames)
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}", "-i", "pipe:0"]
+    command = [program, "-loglevel", "error", "-y", *raw, *VIDEO_FORMATS[form], "-f", form, str(path)]
+    count = 0
+    with tempfile.TemporaryFile() as said:
+        # A session of its own: Ctrl-C is not for ffmpeg, which would call half a film a whole one.
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=said, stderr=said, start_new_session=True)
+        assert process.stdin is not None
+        try:
+            for frame in chain([first], frames):
+                process.stdin.write(np.ascontiguousarray(frame).data)
+                count += 1
+            process.stdin.close()
+        except BrokenPipeError:
+            pass  # it has ended, and said why
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            code = process.wait()
+            with suppress(BrokenPipeError):
+                process.stdin.close()
+        if code or not path.stat().st_size:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
+            raise _EncodingError(lines[-1][:200])
     return count

@@ -197,7 +197,8 @@ class Recording(NamedTuple):
     """One episode of one brain, step by step.
 
     Attributes:
-        snapshots: T of them, what the world was when the brain sensed it, see `exneat_cli.tasks.HasPicture`.
+        snapshots: what the world was when the brain sensed it, see `exneat_cli.tasks.HasPicture`, at step 0 and at
+            every so many steps from there.
         values: (T, memory) the brain's value vector after each step.
         trace: (T + 1, columns) as of `exneat_cli.rollouts.Trace`.
     """
@@ -207,7 +208,7 @@ class Recording(NamedTuple):
     trace: NDArray[np.float64]
 
 
-def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, steps: int) -> Recording:
+def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, steps: int, every: int = 1) -> Recording:
     """Run an episode, of at most so many steps, in the same loop as all others, but step by step in plain Python."""
     assert isinstance(task, Task)
     simulation, halt = open_world(task, noise, training=False), np.zeros(1, np.bool_)
@@ -218,7 +219,8 @@ def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, s
     values: list[NDArray[np.float64]] = []
 
     def observe(world: Any, readings: NDArray[np.float64]) -> None:
-        snapshots.append(task.snapshot(world))
+        if len(values) % every == 0:
+            snapshots.append(task.snapshot(world))
         simulation.observe(world, readings)
 
     def step(world: Any, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:

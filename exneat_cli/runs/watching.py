@@ -9,31 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains import places_in_memory
-from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion
 from exneat_cli.rollouts import Noise, Sweep, perturbed, record
 from exneat_cli.runs.robustness import load_champion, load_settings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
-from exneat_cli.tasks import HasDistance, HasPicture, Task
+from exneat_cli.tasks import HasDistance, HasPicture, HasTiles, Task
 
 SMOOTHED = 1.0
 """Seconds over which a speed is taken."""
+BODY_FPS, STEP_FPS = 10.0, 4.0
+"""Frames a second unless told otherwise: of a body's own time, at most one a control step; where steps have no
+duration, one each."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """An episode of T steps that can be drawn.
+    """An episode that can be drawn in F frames.
 
     Attributes:
         task: whose cameras draw it.
         champion: who acted.
         title: the run in a word.
         nodes: inputs and nodes of modules, see `exneat_cli.brains.places_in_memory`.
-        snapshots: T of the world.
-        shares: (T, nodes) their values over the largest magnitude so far.
-        captions: T of them.
-        period: seconds per step, None where steps have no duration.
+        snapshots: F of the world.
+        shares: (F, nodes) their values over the largest magnitude so far.
+        captions: F of them.
+        fps: frames a second, in real time where steps have a duration.
     """
 
     task: Task
@@ -43,11 +45,11 @@ class Scene:
     snapshots: list[Any]
     shares: NDArray[np.float64]
     captions: list[str]
-    period: float | None
+    fps: float
 
 
 def record_champion(
-    directory: RunDirectory, *, episode: int, seed: int | None, sweep: Sweep | None, steps: int
+    directory: RunDirectory, *, episode: int, seed: int | None, sweep: Sweep | None, steps: int, fps: float | None
 ) -> Scene:
     """Let a run's champion go through a test episode, of at most so many steps.
 
@@ -57,18 +59,19 @@ def record_champion(
         seed: root of other episodes instead; None for the test episodes.
         sweep: with one level, at which it is watched.
         steps: at most.
+        fps: frames a second; None for `BODY_FPS` or `STEP_FPS`.
 
     Raises:
-        ExneatError: the run has no champion, its task has no pictures, or the sweep does not fit it.
+        ExneatError: the run has no champion, its task cannot be drawn, or the sweep does not fit it.
     """
     settings = load_settings(directory)
     champion, task, noise = load_champion(directory, settings), settings.task, settings.noise
     if sweep is not None:
         task, noise = perturbed(task, noise, sweep, sweep.levels[0])
-    if not isinstance(task, HasPicture):
-        fix = "a class of yours is watched once it has the methods snapshot() and camera(), see HasPicture"
-        raise ExneatError(f"run={directory.path}: expected a robot or a grid world, got task={task.name}\n  {fix}")
-    recording = record(task, noise, champion.brain(), _seeds(episode, seed), steps)
+    task, period = task.drawable(), task.step_seconds
+    assert isinstance(task, HasPicture)
+    every = 1 if period is None else max(1, round(1.0 / ((fps or BODY_FPS) * period)))
+    recording = record(task, noise, champion.brain(), _seeds(episode, seed), steps, every)
     places = places_in_memory(
         champion.plan, [genome.in_arrays() for genome in champion.genomes], feed_forward=champion.feed_forward
     )
@@ -83,11 +86,11 @@ def record_champion(
         values[0, linked] = 0.0
     # So far: nodes of relu that feed themselves may grow without bounds, and would seem to begin with nothing.
     largest = np.maximum.accumulate(np.abs(values), axis=0)
-    period = float(task.seconds_of(1)) if isinstance(task, HasDistance) else None
-    captions = _captions(task, recording.trace, len(values), period)
+    captions = _captions(task, recording.trace, range(0, len(values), every))
     title = directory.path.name + _level(sweep, noise)
-    shares = values / np.where(largest > 0.0, largest, 1.0)
-    return Scene(task, champion, title, nodes, recording.snapshots, shares, captions, period)
+    shares = (values / np.where(largest > 0.0, largest, 1.0))[::every]
+    pace = (fps or STEP_FPS) if period is None else 1.0 / (every * period)
+    return Scene(task, champion, title, nodes, recording.snapshots, shares, captions, pace)
 
 
 def _seeds(episode: int, seed: int | None) -> EpisodeSeeds:
@@ -100,20 +103,22 @@ def _level(sweep: Sweep | None, noise: Noise) -> str:
     return "" if sweep is None else f", {sweep.name} {sweep.levels[0]:g}"
 
 
-def _captions(task: Task, trace: NDArray[np.float64], steps: int, period: float | None) -> list[str]:
-    """Of the world as it is before each step."""
-    columns = list(task.trace_columns)
-    if period is not None:
-        x = trace[:, columns.index("x")]
-        window = max(1, round(SMOOTHED / period))
-        first = np.maximum(0, np.arange(steps) - window)
-        seconds = np.maximum(1, np.arange(steps) - first) * period
-        speeds = (x[:steps] - x[first]) / seconds
-        return [
-            f"time {t * period:5.1f} s    speed {speeds[t]:5.2f} m/s    distance {x[t] - x[0]:6.2f} m"
-            for t in range(steps)
-        ]
-    free = [k for k, name in enumerate(columns) if name.endswith("_free")]
-    caught = [f", {len(free) - int(row[free].sum())} of {len(free)} caught" if free else "" for row in trace[:steps]]
-    colours = "red, blue: channels; green: agent; yellow: prey or goal"
-    return [f"step {t}{words}    {colours}" for t, words in enumerate(caught)]
+def _captions(task: Task, trace: NDArray[np.float64], shown: range) -> list[str]:
+    """Of the world as it is before each of these steps."""
+    columns, period = list(task.trace_columns), task.step_seconds
+    times = [f"step {t}" if period is None else f"time {t * period:5.1f} s" for t in shown]
+    if isinstance(task, HasTiles):
+        free = [k for k, name in enumerate(columns) if name.endswith("_free")]
+        caught = [f", {len(free) - int(trace[t, free].sum())} of {len(free)} caught" if free else "" for t in shown]
+        colours = "red, blue: channels; green: agent; yellow: prey or goal"
+        return [f"{time}{words}    {colours}" for time, words in zip(times, caught, strict=True)]
+    if isinstance(task, HasDistance) and period is not None:
+        x, said = trace[:, columns.index("x")], []
+        for t in shown:
+            first = max(0, t - max(1, round(SMOOTHED / period)))
+            speed = (x[t] - x[first]) / (max(1, t - first) * period)
+            said.append(f"    speed {speed:5.2f} m/s    distance {x[t] - x[0]:6.2f} m")
+    else:
+        fitness = task.fitness_of(np.cumsum(trace[:, len(columns) :], axis=0))
+        said = [f"    {task.fitness_name} {fitness[t]:.{task.fitness_decimals}f}" for t in shown]
+    return [time + words for time, words in zip(times, said, strict=True)]

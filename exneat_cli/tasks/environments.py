@@ -1,4 +1,4 @@
-"""Gymnasium environments: how one is made, and what goes into it and comes out of it."""
+"""Gymnasium environments: how one is made, what goes into it and comes out of it, and what it looks like."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import functools
 import importlib
 import json
 import math
+import os
 import warnings
+import zlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -17,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from exneat_cli.errors import ConfigError
+from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.tasks.user_code import make_findable
 
 
@@ -25,7 +27,8 @@ class Interface(NamedTuple):
     """What goes into an environment and comes out of it.
 
     low, high: (A,) what -1 and 1 stand for; `space`: of the environment's actions; `first`: the smallest of several
-    actions, None if they are numbers; `max_steps`: its own limit, if it has one.
+    actions, None if they are numbers; `max_steps`: its own limit, if it has one; `render_modes`, `render_fps`: how it
+    can be drawn, and control steps a second, if they have a duration; `is_mujoco`: whether MuJoCo simulates it.
     """
 
     observation_size: int
@@ -35,6 +38,9 @@ class Interface(NamedTuple):
     space: spaces.Space[Any]
     first: int | None
     max_steps: int | None
+    render_modes: tuple[str, ...]
+    render_fps: float | None
+    is_mujoco: bool
 
     @property
     def is_discrete(self) -> bool:
@@ -57,6 +63,7 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     try:
         senses, acts = env.observation_space, env.action_space
         max_steps = env.spec.max_episode_steps if env.spec else None
+        shown = _looks_of(env)
     finally:
         env.close()
     if not isinstance(senses, spaces.Box) or senses.dtype.kind not in "biuf" or not senses.shape:
@@ -64,7 +71,7 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     size = math.prod(senses.shape)
     if isinstance(acts, spaces.Discrete):
         none = np.zeros(0)
-        return Interface(size, int(acts.n), none, none, acts, int(acts.start), max_steps)
+        return Interface(size, int(acts.n), none, none, acts, int(acts.start), max_steps, *shown)
     if not isinstance(acts, spaces.Box) or acts.dtype.kind != "f":
         raise _unsupported(env_id, "actions that are Discrete or a Box of real numbers", acts)
     low, high = acts.low.ravel().astype(float), acts.high.ravel().astype(float)
@@ -72,7 +79,19 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     # Two units wide where a bound is missing: -1 to 1, or from the other bound on.
     lowest = np.where(has_low, low, np.where(has_high, high - 2.0, -1.0))
     highest = np.where(has_high, high, np.where(has_low, low + 2.0, 1.0))
-    return Interface(size, len(low), lowest, highest, acts, None, max_steps)
+    return Interface(size, len(low), lowest, highest, acts, None, max_steps, *shown)
+
+
+def _looks_of(env: gymnasium.Env[Any, Any]) -> tuple[tuple[str, ...], float | None, bool]:
+    """The last three fields of an `Interface`."""
+    modes, fps = env.metadata.get("render_modes") or (), env.metadata.get("render_fps")
+    return tuple(map(str, modes)), float(fps) if fps else None, simulated_by_mujoco(env) is not None
+
+
+def simulated_by_mujoco(env: gymnasium.Env[Any, Any]) -> mujoco.MjData | None:
+    """The state of an environment's MuJoCo simulation, if it has one."""
+    data = getattr(env.unwrapped, "data", None)
+    return data if isinstance(data, mujoco.MjData) else None
 
 
 def _unsupported(env_id: str, expected: str, came: object) -> ConfigError:
@@ -126,3 +145,40 @@ def _unknown(env_id: str) -> ConfigError:
 def in_words(error: BaseException) -> str:
     """An error of any code in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]
+
+
+PICTURES = "rgb_array"
+"""The render mode in which an environment hands out its pictures."""
+Snapshot = tuple[bytes, tuple[int, int, int]]
+"""An environment's own picture, compressed by zlib, since an episode has hundreds, and its shape."""
+
+
+def picture_of(env: gymnasium.Env[Any, Any], env_id: str) -> Snapshot:
+    """What an environment made for `PICTURES` looks like now.
+
+    Raises:
+        ExneatError: it cannot be drawn here, or gives no picture.
+    """
+    # pygame greets on standard output, and looks for a screen that nobody needs.
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # pygame's, about libraries of its own
+            picture: Any = env.render()
+    except Exception as error:  # of any code
+        raise ExneatError(f"task.env_id={env_id}: it cannot be drawn here: {in_words(error)}") from error
+    pixels = np.asarray(picture)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8:
+        came = f"expected a picture of (height, width, 3) bytes, got {pixels.shape} of {pixels.dtype}"
+        raise ExneatError(f"task.env_id={env_id}: {came}")
+    return zlib.compress(pixels.tobytes(), 1), pixels.shape
+
+
+class EnvironmentCamera:
+    """Hands on the pictures that environments draw themselves, in their own size."""
+
+    def draw(self, snapshot: Snapshot) -> NDArray[np.uint8]:
+        """(height, width, 3)."""
+        content, shape = snapshot
+        return np.frombuffer(zlib.decompress(content), np.uint8).reshape(shape)

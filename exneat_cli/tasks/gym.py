@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import gymnasium
@@ -35,8 +35,18 @@ from exneat_cli.errors import (
     check_text,
     check_whole,
 )
-from exneat_cli.tasks.environments import Interface, in_words, interface_of, make
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Adapter, Part, Simulation, Task, setting
+from exneat_cli.tasks.environments import (
+    PICTURES,
+    EnvironmentCamera,
+    Interface,
+    Snapshot,
+    in_words,
+    interface_of,
+    make,
+    picture_of,
+    simulated_by_mujoco,
+)
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Adapter, Camera, Part, Simulation, Task, setting
 
 LARGEST = 2**25
 """Readings, or entries of actions, in a longest episode, 256 MiB: noise needs room for all of them."""
@@ -151,6 +161,36 @@ class GymTask(Task):
         return Adapter(self.sensor_names, None, ones, 0.5 * (low + high), 0.5 * (high - low), bounded=True)
 
     @property
+    def step_seconds(self) -> float | None:
+        """By the frames a second that the environment is made to be watched at, one a control step (s)."""
+        fps = self._interface.render_fps
+        return 1.0 / fps if fps else None
+
+    @property
+    def drawn_by_mujoco(self) -> bool:  # type: ignore[override]
+        """Whether it is one of the environments on MuJoCo."""
+        return self._interface.is_mujoco
+
+    def drawable(self) -> GymTask:
+        """The same environment, made to hand out pictures.
+
+        Raises:
+            ExneatError: it has none.
+        """
+        if PICTURES not in (modes := self._interface.render_modes):
+            came = f"expected an environment with the render mode {PICTURES}, got {', '.join(modes) or 'none'}"
+            raise ExneatError(f"task.env_id={self.env_id}: {came}; it cannot be filmed")
+        return replace(self, kwargs={**self.kwargs, "render_mode": PICTURES})
+
+    def snapshot(self, world: _World) -> Snapshot:
+        """What the environment draws."""
+        return picture_of(world.env, self.env_id)
+
+    def camera(self, width: int, height: int) -> Camera:
+        """Pictures of the environment's own size, whatever is asked for."""
+        return EnvironmentCamera()
+
+    @property
     def _interface(self) -> Interface:
         return interface_of(self.env_id, json.dumps(self.kwargs))
 
@@ -197,8 +237,7 @@ class _World:
     def __init__(self, env: gymnasium.Env[Any, Any], interface: Interface, env_id: str) -> None:
         self.env, self.interface, self.env_id = env, interface, env_id
         self.seed, self.observation = 0, np.zeros(interface.observation_size)
-        data = getattr(env.unwrapped, "data", None)
-        self.data = data if isinstance(data, mujoco.MjData) else None
+        self.data = simulated_by_mujoco(env)
         self.warnings = 0
 
     def see(self, observation: Any) -> None:

@@ -11,6 +11,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from exneat_cli.errors import ExneatError
+
 RUNNING = 0
 """The episode goes on."""
 ENDED = 1
@@ -129,6 +131,8 @@ class Task(ABC):
     """Names of what `Simulation.locate` writes."""
     trunk: ClassVar[Part | None] = None
     """What belongs to no part, for a central module."""
+    drawn_by_mujoco: ClassVar[bool] = False
+    """Whether pictures need MuJoCo's renderer, and so EGL, OSMesa or a screen."""
 
     name: str
     """The task's name in `conf/task` and in run directories."""
@@ -210,6 +214,22 @@ class Task(ABC):
         values = asdict(self)  # type: ignore[call-overload]
         return {each.metadata.get("setting", each.name): values[each.name] for each in fields(self)}  # type: ignore[arg-type]
 
+    @property
+    def step_seconds(self) -> float | None:
+        """What a control step takes (s); None where steps have no duration."""
+        return None
+
+    def drawable(self) -> Task:
+        """The task with worlds that can be drawn, see `HasPicture`.
+
+        Raises:
+            ExneatError: they cannot.
+        """
+        if not isinstance(self, HasPicture):
+            fix = "a class of yours is watched once it has the methods snapshot() and camera(), see HasPicture"
+            raise ExneatError(f"task={self.name}: expected a task whose worlds can be drawn\n  {fix}")
+        return self
+
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""
         return np.asarray(np.sum(totals, axis=-1))
@@ -265,7 +285,7 @@ class Camera(Protocol):
     """Draws what a world was; belongs to one process."""
 
     def draw(self, snapshot: Any) -> NDArray[np.uint8]:
-        """(height, width, 3) the picture of a `HasPicture.snapshot`."""
+        """(height, width, 3) the picture of a `HasPicture.snapshot`; one of another size is made to fit."""
 
 
 @runtime_checkable

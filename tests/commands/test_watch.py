@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from exneat_cli.commands import watch
+import exneat_cli
+from exneat_cli.analysis.film import fitted
+from exneat_cli.commands import drawing, watch
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records.video import VIDEO_FORMATS
@@ -31,7 +37,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["task=foraging", "task.steps=9"],
             ["task=foraging", "task.steps=9", "seed=1"],
             ["task=foraging", "algorithm=random"],
-            ["task=gym"],
             ["task=ant", "task.max_steps=12"],
         ):
             assert main(["train", "budget=smoke", *settings, f"output={output}"]) == 0
@@ -86,7 +91,7 @@ def test_runs_stand_side_by_side_without_panels_and_under_noise(runs: Path, tmp_
 def test_a_robot_is_in_view_and_its_nodes_light_up(runs: Path) -> None:
     pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
     try:
-        watch.choose_renderer()
+        drawing.choose_renderer()
     except ExneatError as error:
         pytest.skip(str(error))
     run = run_of(runs, "ant/*")
@@ -124,16 +129,56 @@ def test_training_films_its_champion_once_if_asked_to_and_does_without_where_it_
     check_refusal([*train, "video=1"], ["video: expected true or false"], tmp_path, capfd)
 
 
-def test_a_film_that_cannot_be_finished_leaves_what_was_there(
-    runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+FAULTY = {
+    "an unknown codec": "-c:v nonsense",
+    "a disk that fills up once frames were taken": "-c:v libx264 -pix_fmt yuv420p -f mp4 /dev/full",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTY)
+def test_a_film_that_ffmpeg_cannot_finish_leaves_what_was_there(
+    fault: str, runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
     before = tmp_path / "film.mp4"
     before.write_bytes(b"before")
-    monkeypatch.setitem(VIDEO_FORMATS, "mp4", {"codec": "none such", "output_params": []})
+    monkeypatch.setitem(VIDEO_FORMATS, "mp4", FAULTY[fault].split())
     run = run_of(runs, "foraging/exneat-*-s0-*")
     arguments = ["watch", f"run={run}", "workers=1", "width=64", "height=64", f"output={before}"]
-    check_refusal(arguments, ["film.mp4: could not be written"], tmp_path, capfd)
+    check_refusal(arguments, ["film.mp4: could not be written: ffmpeg says"], tmp_path, capfd)
+
+
+def test_a_picture_of_any_shape_fits_in_without_being_stretched() -> None:
+    picture = fitted(np.full((20, 80, 3), (200, 0, 0), np.uint8), 160, 120)
+    rows, columns = np.nonzero((picture == (200, 0, 0)).all(axis=-1))
+    assert picture.shape == (120, 160, 3)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (40, 79, 0, 159)
+
+
+def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: Path) -> None:
+    run = run_of(runs, "foraging/exneat-*-s0-*")
+    script = "import sys\nfrom exneat_cli.main import main\nif __name__ == '__main__': sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", script, "watch", f"run={run}", "live=true", "width=160", "height=120"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(exneat_cli.__file__).parents[1])}
+    with subprocess.Popen([*command, "workers=1"], stdout=subprocess.PIPE, env=environment, text=True) as process:
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().split()[0]
+            assert address.startswith("http://127.0.0.1:")
+            with urlopen(address) as page:
+                text = page.read().decode()
+            assert "last = 8" in text
+            assert not re.findall(r"(?:src|href)=.?(?:https?:)?//", text), "it would ask the network"
+            with urlopen(f"{address}/frames/8.jpg") as frame, Image.open(frame) as picture:
+                assert picture.size == (320, 120)
+            for absent in ("frames/9.jpg", "frames/-1.jpg", "frames/../../etc/passwd"):
+                with pytest.raises(HTTPError, match="404"):
+                    urlopen(f"{address}/{absent}")
+            port = address.rpartition(":")[2]
+            assert main(["watch", f"run={run}", "live=true", f"port={port}", "steps=1", "workers=1"]) == 2
+        finally:
+            process.send_signal(signal.SIGINT)
+    assert process.returncode == 0
 
 
 BAD = {
@@ -149,6 +194,9 @@ BAD = {
     "width=10": "width: expected a whole number from 64 to 4096",
     "steps=0": "steps: expected a whole number",
     "fps=0": "fps: expected a number",
+    "live=1": "live: expected true or false",
+    "port=70000": "port: expected a whole number from 0 to 65535",
+    "live=true output=x.mp4": "output: expected null with live=true",
     "workers=99": "workers: expected a whole number",
     "foo=1": "foo: unknown key",
     "output=/proc/self/no/film.mp4": "/proc/self/no",
@@ -176,7 +224,6 @@ def test_what_cannot_be_filmed_is_refused(
     (old / "champion.json").write_text((old / "champion.json").read_text().replace('"format": 3', '"format": 2'))
     for arguments, named in {
         f"run={run_of(runs, 'foraging/random-*')}": "has no champion: random is a baseline",
-        f"run={run_of(runs, 'gym/*')}": "expected a robot or a grid world, got task=gym",
         f"run={old}": "expected format 3, got 2: another version of exneat",
         f"run={runs}/foraging/exneat-*": "output: expected a file, where several runs",
     }.items():
@@ -185,6 +232,6 @@ def test_what_cannot_be_filmed_is_refused(
     def failing(*arguments: Any, **environment: str) -> str:
         raise ExneatError("no library")
 
-    monkeypatch.setattr(watch, "said_by", failing)
+    monkeypatch.setattr(drawing, "said_by", failing)
     named = ["expected a renderer for MuJoCo, got none", "apt-get install libegl1"]
     check_refusal(["watch", f"run={run_of(runs, 'ant/*')}"], named, runs, capfd)

@@ -72,11 +72,13 @@ def test_a_film_says_time_distance_and_what_was_caught_and_ends_when_told(tmp_pa
     directories = [
         train(RunSettings(**{**vars(settings), "output": str(tmp_path)})).directory for settings in SETTINGS.values()
     ]
-    walk, hunt = (record_champion(each, episode=0, seed=None, sweep=None, steps=5) for each in directories)
+    walk, hunt = (record_champion(each, episode=0, seed=None, sweep=None, steps=5, fps=None) for each in directories)
     assert walk.captions[0] == "time   0.0 s    speed  0.00 m/s    distance   0.00 m"
-    assert walk.captions[4].startswith("time   0.2 s")
+    assert walk.captions[2].startswith("time   0.2 s")
     assert re.match(r"step 0, \d of 10 caught", hunt.captions[0])
-    assert len(walk.snapshots) == len(hunt.captions) == len(hunt.shares) == 5
+    assert len(walk.snapshots) == len(walk.captions) == len(walk.shares) == 3, "every second one, in real time"
+    assert len(hunt.snapshots) == len(hunt.captions) == len(hunt.shares) == 5
+    assert (walk.fps, hunt.fps) == (10.0, 4.0)
     assert np.abs(walk.shares).max() == 1.0
-    other = record_champion(directories[1], episode=0, seed=9, sweep=None, steps=5)
+    other = record_champion(directories[1], episode=0, seed=9, sweep=None, steps=5, fps=None)
     assert not np.array_equal(other.snapshots[0][0], hunt.snapshots[0][0])

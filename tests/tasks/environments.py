@@ -43,10 +43,15 @@ class Bounded(gymnasium.Env[Any, Any]):
 
 
 class Choosing(gymnasium.Env[Any, Any]):
-    """Pays the number of the action, of which there are three from 7 on; ends with 9."""
+    """Pays the number of the action, of which there are three from 7 on; ends with 9. Its pictures are wide and red."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  Gymnasium's own way
 
     observation_space = spaces.Box(0, 255, (2,), np.uint8)
     action_space = spaces.Discrete(3, start=7)
+
+    def __init__(self, render_mode: str | None = None, pictures: bool = True) -> None:
+        self.render_mode, self.pictures = render_mode, pictures
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         super().reset(seed=seed)
@@ -55,6 +60,9 @@ class Choosing(gymnasium.Env[Any, Any]):
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         assert self.action_space.contains(action)
         return np.array([1, 2], np.uint8), float(action), action == 9, False, {}
+
+    def render(self) -> Any:
+        return np.full((20, 80, 3), (200, 0, 0), np.uint8 if self.pictures else float)
 
 
 gymnasium.register("exneat-tests/Bounded-v0", Bounded, max_episode_steps=5)

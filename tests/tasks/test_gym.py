@@ -219,3 +219,17 @@ def test_a_library_that_an_environment_lacks_is_named(monkeypatch: pytest.Monkey
     monkeypatch.setattr(gymnasium, "make", lacking)
     with pytest.raises(ConfigError, match=r"(?s)an environment that is installed, got 'BipedalWalker-v3'.*box2d"):
         GymTask(env_id="BipedalWalker-v3", kwargs={"hardcore": True})
+
+
+def test_an_environment_with_pictures_is_filmed_in_its_own_time_and_others_are_refused() -> None:
+    task = GymTask(env_id=CHOOSING)
+    assert task.step_seconds == 1 / 20
+    drawable = task.drawable()
+    picture = drawable.camera(64, 64).draw(drawable.snapshot(opened(drawable).world))
+    assert picture.shape == (20, 80, 3)
+    assert (picture == (200, 0, 0)).all()
+    with pytest.raises(ExneatError, match="expected an environment with the render mode rgb_array, got none"):
+        GymTask(env_id=BOUNDED).drawable()
+    drawable = GymTask(env_id=CHOOSING, kwargs={"pictures": False}).drawable()
+    with pytest.raises(ExneatError, match=r"expected a picture of \(height, width, 3\) bytes, got"):
+        drawable.snapshot(opened(drawable).world)

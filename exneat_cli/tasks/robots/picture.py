@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import copy
 
 import mujoco
@@ -36,6 +37,7 @@ class RobotCamera:
         self._camera.azimuth, self._camera.elevation = BODY if is_free else PLANAR
         self._height = float(self._data.xpos[trunk, 2])
         self._renderer = mujoco.Renderer(model, height, width)
+        atexit.register(self._renderer.close)  # OSMesa complains of one that is closed after Python's own shutdown
 
     def draw(self, snapshot: NDArray[np.float64]) -> NDArray[np.uint8]:
         """(height, width, 3) of positions, (nq,)."""

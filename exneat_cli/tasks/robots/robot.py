@@ -79,6 +79,7 @@ class RobotTask(Task):
     fitness_decimals: ClassVar[int] = 1
     failure_floor: ClassVar[float] = -100.0
     trace_columns: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    drawn_by_mujoco: ClassVar[bool] = True
     """Position of the trunk in metres."""
 
     def __post_init__(self) -> None:
@@ -198,6 +199,11 @@ class RobotTask(Task):
     def seconds_of(self, steps: float) -> float:
         """What so many control steps take (s)."""
         return steps * float(load(self.model).opt.timestep) * self._substeps
+
+    @property
+    def step_seconds(self) -> float:
+        """The model's time step times its substeps (s)."""
+        return self.seconds_of(1)
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new world with the model's own noise on the initial pose."""

@@ -1,0 +1,132 @@
+"""Drawing the frames of films in processes of their own, and the renderer that they need."""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Generator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exneat_cli.commands.doctor import FRAME, said_by
+from exneat_cli.errors import ExneatError
+from exneat_cli.records.champion import Champion
+from exneat_cli.runs import Scene
+from exneat_cli.tasks import HasPicture, Task
+
+PORTION = 8
+"""Frames that a process draws at a time."""
+
+
+def choose_renderer() -> None:
+    """Set MUJOCO_GL for processes to come, unless the user did, and try it out.
+
+    Raises:
+        ExneatError: MuJoCo can draw nothing here.
+    """
+    given = os.environ.get("MUJOCO_GL")
+    choices = [given] if given or sys.platform != "linux" else ["egl", "osmesa"]
+    for choice in choices:
+        try:
+            said_by(["-c", FRAME], 60.0, **({"MUJOCO_GL": choice} if choice else {}))
+        except ExneatError as error:
+            why = str(error)
+            continue
+        if choice:
+            os.environ["MUJOCO_GL"] = choice
+        return
+    fix = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and leave MUJOCO_GL unset; exneat doctor tries it"
+    raise ExneatError(
+        f"watch: expected a renderer for MuJoCo, got none ({', '.join(map(str, choices))}): {why}\n  {fix}"
+    )
+
+
+class _Look(NamedTuple):
+    """How one scene looks, whatever the moment."""
+
+    task: Task
+    champion: Champion | None
+    nodes: list[tuple[int, int]]
+    title: str
+
+
+_Moment = tuple[Any, NDArray[np.float64], str]
+"""What was, the shares of nodes, and the caption."""
+
+
+def drawn(
+    scenes: Sequence[Scene], size: tuple[int, int], with_panels: bool, workers: int
+) -> Generator[NDArray[np.uint8]]:
+    """The frames in order, drawn by processes of their own; scenes that are over stay at their end.
+
+    Raises:
+        ExneatError: a process could not draw.
+    """
+    looks = [_Look(scene.task, scene.champion if with_panels else None, scene.nodes, scene.title) for scene in scenes]
+    moments = [[_moment(scene, k) for scene in scenes] for k in range(frames_of(scenes))]
+    portions = [moments[k : k + PORTION] for k in range(0, len(moments), PORTION)]
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(workers, len(portions)), context, _prepare, (looks, size))
+    try:
+        waiting: list[Future[list[NDArray[np.uint8]]]] = []
+        for portion in portions:
+            waiting.append(pool.submit(_draw, portion))
+            if len(waiting) > 2 * workers:  # frames are large: no more of them than are needed soon
+                yield from waiting.pop(0).result()
+        for each in waiting:
+            yield from each.result()
+    except BrokenProcessPool as error:
+        raise ExneatError("watch: a process that drew frames died\n  exneat doctor tries the renderer") from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def frames_of(scenes: Sequence[Scene]) -> int:
+    """How many frames show all of the longest scene."""
+    return max(len(scene.snapshots) for scene in scenes)
+
+
+def _moment(scene: Scene, k: int) -> _Moment:
+    last = len(scene.snapshots) - 1
+    t = min(k, last)
+    return scene.snapshots[t], scene.shares[t], scene.captions[t] + ("    ended" if k > last else "")
+
+
+_painter: Any = None
+
+
+def _prepare(looks: Sequence[_Look], size: tuple[int, int]) -> None:
+    """Open cameras in a process that draws."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that began it hears it
+    from exneat_cli.analysis.film import BAR, Panel
+
+    global _painter
+    cameras, panels, room = [], [], (size[0], size[1] - 2 * BAR)
+    for look in looks:
+        assert isinstance(look.task, HasPicture)
+        cameras.append(look.task.camera(*room))
+        panels.append(look.champion and Panel(look.champion, look.nodes, *size))
+    _painter = functools.partial(_paint, looks, cameras, panels, room)
+
+
+def _draw(moments: Sequence[Sequence[_Moment]]) -> list[NDArray[np.uint8]]:
+    return [_painter(each) for each in moments]
+
+
+def _paint(
+    looks: Any, cameras: Any, panels: Any, room: tuple[int, int], moments: Sequence[_Moment]
+) -> NDArray[np.uint8]:
+    from exneat_cli.analysis.film import Still, fitted, frame
+
+    stills = [
+        Still(fitted(camera.draw(snapshot), *room), look.title, caption, panel and panel.draw(shares))
+        for look, camera, panel, (snapshot, shares, caption) in zip(looks, cameras, panels, moments, strict=True)
+    ]
+    return frame(stills)
