@@ -117,7 +117,8 @@ def _captions(task: Task, trace: NDArray[np.float64], shown: range) -> list[str]
         for t in shown:
             first = max(0, t - max(1, round(SMOOTHED / period)))
             speed = (x[t] - x[first]) / (max(1, t - first) * period)
-            said.append(f"    speed {speed:5.2f} m/s    distance {x[t] - x[0]:6.2f} m")
+            # Adding 0 takes the sign of what rounds to 0.
+            said.append(f"    speed {round(speed, 2) + 0.0:5.2f} m/s    distance {round(x[t] - x[0], 2) + 0.0:6.2f} m")
     else:
         fitness = task.fitness_of(np.cumsum(trace[:, len(columns) :], axis=0))
         said = [f"    {task.fitness_name} {fitness[t]:.{task.fitness_decimals}f}" for t in shown]
