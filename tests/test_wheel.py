@@ -63,6 +63,10 @@ def test_the_wheel_asks_for_every_library_that_it_imports(unpacked: Path) -> Non
         "mujoco_warp",
         "onnx",
         "imageio_ffmpeg",
+        "mlflow",
+        "optuna",
+        "tensorboard",
+        "wandb",
         "warp",
     }  # imported after a check that they are there
     assert libraries - of_extras == required

@@ -25,7 +25,7 @@ HELP = """exneat completion: print what makes a shell complete commands, setting
   zsh:  add to ~/.zshrc, after compinit       eval "$(exneat completion zsh)"
   fish: exneat completion fish > ~/.config/fish/completions/exneat.fish
 """
-_OF_TRAINING = ("train", "sweep", "report")
+_OF_TRAINING = ("train", "sweep", "search", "report")
 """Commands that take every setting of a run."""
 _PLACES = ("-cd", "--config-dir", "-cp", "--config-path")
 _FLAGS = ("--help", "--config-dir=", "--config-path=", "--config-name=", "--cfg")

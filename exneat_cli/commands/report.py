@@ -41,7 +41,10 @@ def run(line: CommandLine) -> int:
     names = sorted({name for artefact in artefacts.values() for name in _experiments_of(artefact)})
     sources = {name: asked["experiment"] if own and own.name == name else name for name in names}
     experiments = {name: read_experiment(source) for name, source in sources.items()}
-    rows = {name: read_published(results_file(sources[name])) for name in names}
+    rows: dict[str, list[PublishedRun]] = {name: [] for name in names}
+    if own or any(_has_any(each, budget, asked["output"], ()) for each in experiments.values() for budget in BUDGETS):
+        # Published runs fill in what one's own lack; where there are none, a mistyped output= should say so.
+        rows = {name: list(read_published(results_file(sources[name]))) for name in names}
     budgets = {
         name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
     }

@@ -262,7 +262,7 @@ def test_help_imports_nothing_heavy_and_shows_every_setting_with_its_meaning(com
     if command:
         assert done.stdout.startswith(f"exneat {command}: ")
         shown = re.sub(r"\s+", " ", done.stdout)
-        for line in shown_settings(command):
+        for line in shown_settings(command) if command != "completion" else ():  # which has no settings
             assert line in shown
         assert ("seed=0" in shown) == (command in ("train", "sweep", "search"))
         assert "${" not in shown

@@ -167,8 +167,8 @@ def _judge(
         return _Stop(seconds, left, files, "ended before exneat had begun")
     if code != _CODES[signal.Signals(kind)]:
         mistakes.add(f"{name}: exit code {code}: {errors[-300:]}")
-    elif "Traceback" in errors or not errors.splitlines() or "to resume" not in errors.splitlines()[-1]:
-        mistakes.add(f"{name}: does not end in one line that says how to resume: {errors[-300:]}")
+    elif "Traceback" in errors or not errors.splitlines() or not errors.splitlines()[-1].startswith("exneat "):
+        mistakes.add(f"{name}: does not end in the command that goes on: {errors[-300:]}")
     return _Stop(seconds, left, files, "stopped", _unmarked(program.temporary.parent / "out"))
 
 
