@@ -172,7 +172,7 @@ def test_files_with_other_line_ends_and_letters_in_places_with_spaces_or_links_a
         ("doctor", "", "output: is missing"),
         ("evaluate", "run: out", "task: is missing"),
         ("evaluate", "{run: out, task: {}}", "sweeps: is missing"),
-        ("report", "output: out", "experiment: is missing"),
+        ("report", "{output: out, budget: smoke}", "experiment: is missing"),
         ("sweep", "budget: smoke", "experiment: is missing"),
         ("train", "output: out", "task: expected a section"),
         ("inspect", "runs: out", "runs: unknown key (value 'out')"),
