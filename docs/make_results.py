@@ -15,9 +15,10 @@ from exneat_cli.analysis.report_figures import draw_figure
 from exneat_cli.analysis.statistics import bootstrap_interval, compare
 from exneat_cli.analysis.study import MissingRunsError, Study
 from exneat_cli.analysis.tables import build_comparison, build_table
-from exneat_cli.commands.command_line import read_command_line, shipped_directory
+from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import BUDGETS
 from exneat_cli.commands.report import study_of
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.commands.sweep import experiment_names, read_experiment, results_file
 from exneat_cli.records import read_published
 

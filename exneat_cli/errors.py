@@ -10,7 +10,7 @@ import difflib
 import math
 import os
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,8 +79,13 @@ def check_flag(key: str, value: object) -> None:
 def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
     """Refuse anything but one of `choices` with a `ConfigError`."""
     if not isinstance(value, str) or value not in choices:
-        close = difflib.get_close_matches(value, choices, n=1) if isinstance(value, str) else []
-        raise ConfigError(key, "one of " + ", ".join(choices), value, f"did you mean {close[0]}?" if close else "")
+        raise ConfigError(key, "one of " + ", ".join(choices), value, nearest(str(value), choices))
+
+
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.6, prefix: str = "") -> str:
+    """Ask whether the nearest of what is known was meant, with `prefix` before it; empty if none is near."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
+    return f"did you mean {prefix}{close[0]}?" if close else ""
 
 
 def check_text(key: str, value: object, expected: str = "text") -> None:
@@ -110,6 +115,5 @@ def check_keys(prefix: str, values: Mapping[str, Any], known: Collection[str]) -
     """
     for key in values:
         if key not in known:
-            close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
-            hint = f"did you mean {prefix}{close[0]}?" if close else "known here: " + ", ".join(known)
+            hint = nearest(str(key), known, 0.5, prefix) or "known here: " + ", ".join(known)
             raise ExneatError(f"{prefix}{key}: unknown key (value {shortened(values[key])})\n  {hint}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import shlex
@@ -12,7 +11,7 @@ import traceback
 from collections.abc import Sequence
 
 from exneat_cli import __version__
-from exneat_cli.errors import ExneatError
+from exneat_cli.errors import ExneatError, nearest
 from exneat_cli.interruption import SIGNALS, listening, name_window_library, signal_heard
 from exneat_cli.output import NO_ROOM, forgiving_output
 
@@ -97,8 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if command != "doctor" and os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
                 raise ExneatError("NUMBA_DISABLE_JIT: expected 0, got 1: without compiled code nothing runs; unset it")
             if command not in COMMANDS:
-                close = difflib.get_close_matches(command, COMMANDS, n=1)
-                hint = f"did you mean {close[0]}?" if close else "see exneat --help"
+                hint = nearest(command, COMMANDS) or "see exneat --help"
                 raise ExneatError(f"{command}: expected a command, one of {', '.join(COMMANDS)}; {hint}")
             if command == "completion":  # which composes nothing: somebody waits for it
                 return int(importlib.import_module("exneat_cli.commands.completion").run(rest, COMMANDS))

@@ -44,7 +44,7 @@ class Panel:
         scale = min(1.0, width / NATURAL)
         dpi = DPI * scale
         inches = width / dpi, (height - BAR) / dpi
-        with styles.style():
+        with styles.SCREEN.style():
             figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
             canvas = FigureCanvasAgg(figure)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - BAR / height))

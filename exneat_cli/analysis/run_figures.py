@@ -39,7 +39,7 @@ def draw_training(run: RunDirectory, fitness_name: str, tested: float | None = N
     `fitness_name` is its label, and `tested` the champion's mean over the test episodes.
     """
     history = read_csv(run.history, HISTORY_COLUMNS)
-    with styles.style():
+    with styles.SCREEN.style():
         figure = Figure(figsize=(7.0, 4.2), layout="constrained")
         axes = figure.add_subplot()
         for column, look in _CURVES.items():
@@ -72,7 +72,7 @@ def draw_robustness(
     columns = min(len(sweeps), MOST_COLUMNS)
     lines = math.ceil(len(sweeps) / columns)
     band = "one standard deviation over episodes"
-    with styles.style():
+    with styles.SCREEN.style():
         figure = Figure(figsize=(max(6.2, 3.6 * columns), 3.0 * lines + 0.9), layout="constrained")
         panels = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes, (sweep, levels) in zip(panels, sweeps, strict=False):
@@ -98,7 +98,7 @@ def draw_path(run: RunDirectory) -> list[Path]:
     """
     trace = read_csv(run.trace)
     title = f"{styles.run_title(run)}: first test episode"
-    with styles.style():
+    with styles.SCREEN.style():
         if run.tiles.exists():
             figure = _on_tiles(trace, read_csv(run.tiles))
             figure.suptitle(title)

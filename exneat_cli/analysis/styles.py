@@ -5,7 +5,6 @@ Variants have colours that colour-blind readers can tell apart, and shapes and d
 
 from __future__ import annotations
 
-import difflib
 import io
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -18,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exneat_cli.errors import ExneatError
+from exneat_cli.errors import ExneatError, nearest
 from exneat_cli.records import RunDirectory, make_directory, write_whole
 
 Look = dict[str, Any]
@@ -150,9 +149,8 @@ def read_style_sheet(path: Path) -> dict[str, Any]:
         keys = [key for line in lines if (key := line.partition("#")[0].partition(":")[0].strip())]
         for key in keys:
             if key not in matplotlib.rcParams:
-                close = difflib.get_close_matches(key, matplotlib.rcParams, n=1)
-                hint = f"\n  did you mean {close[0]}?" if close else ""
-                raise ExneatError(f"style={path}: {key}: matplotlib has no such setting{hint}")
+                hint = nearest(key, matplotlib.rcParams)
+                raise ExneatError(f"style={path}: {key}: matplotlib has no such setting\n  {hint}".rstrip())
         settings: Any = matplotlib.rc_params_from_file(path, fail_on_error=True, use_default_template=False)
         return dict(settings)
     except (OSError, UnicodeDecodeError) as error:
@@ -161,11 +159,6 @@ def read_style_sheet(path: Path) -> dict[str, Any]:
     except ValueError as error:
         why = str(error).splitlines()[0]
         raise ExneatError(f"style={path}: a value that matplotlib does not take: {why}") from error
-
-
-def style() -> AbstractContextManager[None]:
-    """Context in which figures for the screen are made."""
-    return SCREEN.style()
 
 
 def run_title(run: RunDirectory) -> str:

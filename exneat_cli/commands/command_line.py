@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import copy
-import difflib
 import itertools
 import json
 import re
@@ -28,8 +27,8 @@ from hydra.errors import ConfigCompositionException, HydraException, MissingConf
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
-from exneat_cli.commands.shipped import shipped_directory as shipped_directory
-from exneat_cli.errors import ConfigError, ExneatError, check_keys
+from exneat_cli.commands.shipped import section_of, shipped_directory, yaml_file
+from exneat_cli.errors import ConfigError, ExneatError, check_keys, nearest
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
 """Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
@@ -147,11 +146,8 @@ class CommandLine:
             plain = {str(key): _shown(config, str(key)) for key in config if key != "hydra"}
         names = [str(self.primary), *(["config"] if "task" in choices else [])]
         names += [f"{group}/{option}" for group, option in choices.items()]
-        files = []
-        for name in dict.fromkeys(names):
-            for path in [path for folder in self.directories if (path := folder / f"{name}.yaml").exists()][:1]:
-                is_global = "/" not in name or path.read_text("utf-8").startswith("# @package _global_")
-                files.append(("" if is_global else name.partition("/")[0], path))
+        paths = {name: yaml_file(self.directories, name) for name in names}
+        files = [(section_of(name, path), path) for name, path in paths.items() if path]
         return help_text(self.words[1], files, plain, choices)
 
 
@@ -186,8 +182,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
     """
     flags, unknown = _flag_parser().parse_known_intermixed_args(list(arguments))
     if unknown:
-        close = difflib.get_close_matches(unknown[0], _FLAGS, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"settings are written key=value, see exneat {command} --help"
+        hint = nearest(unknown[0], _FLAGS) or f"settings are written key=value, see exneat {command} --help"
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
         raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
@@ -308,8 +303,8 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
         files = sorted({path.stem for directory in directories for path in (directory / group).glob("*.yaml")})
         known = f"{group or '--config-name'}={option}: no such option; known: {', '.join(files or error.options or ())}"
-        if close := difflib.get_close_matches(option, files or error.options or (), n=1):
-            known += f"\n  did you mean {close[0]}?"
+        if hint := nearest(option, files or error.options or ()):
+            known += f"\n  {hint}"
         if group == "task":
             return f"{known}\n  a class of your own goes by task=custom task.kind=package.module:Class"
         return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known

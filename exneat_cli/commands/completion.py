@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from exneat_cli.commands.shipped import shipped_directory
+from exneat_cli.commands.shipped import section_of, shipped_directory, yaml_file
 from exneat_cli.errors import check_choice
 
 SHELLS = ("bash", "zsh", "fish")
@@ -106,14 +106,13 @@ def _known(command: str, typed: _Words) -> tuple[dict[str, list[str]], dict[str,
     settings: dict[str, Any] = {}
     waiting = [command, *(["config"] if command in _OF_TRAINING else [])]
     for name in waiting:  # which grows meanwhile
-        for path in [path for folder in folders if (path := folder / f"{name}.yaml").is_file()][:1]:
-            content = _read(path)
-            section = "" if "/" not in name or _is_global(path) else f"{name.partition('/')[0]}."
+        if path := yaml_file(folders, name):
+            content, section = _read(path), section_of(name, path)
             for group, option in _groups(content.pop("defaults", [])):
                 if "/" not in group and any((folder / group).is_dir() for folder in folders):
                     groups.setdefault(group, _options(folders, group))
                     waiting.append(f"{group}/{chosen.get(group, option)}")
-            settings |= dict(_flat(content, section))
+            settings |= dict(_flat(content, section and f"{section}."))
     return groups, {key: value for key, value in settings.items() if not _NOT_TYPED.search(key)}
 
 
@@ -131,10 +130,6 @@ def _read(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, yaml.YAMLError):
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def _is_global(path: Path) -> bool:
-    return path.read_text("utf-8").startswith("# @package _global_")
 
 
 def _groups(defaults: Sequence[Any]) -> Iterator[tuple[str, str]]:

@@ -15,8 +15,9 @@ from exneat_cli.analysis.report_figures import AXES, draw_figure
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.analysis.tables import build_comparison, build_table
-from exneat_cli.commands.command_line import CommandLine, shipped_directory
+from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import BUDGETS, Job
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
 from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
@@ -124,9 +125,13 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
 
 def _command(source: str, budget: str, asked: Mapping[str, Any], line: CommandLine) -> str:
     """The command that does what is missing of an experiment, which is a name or a YAML file."""
-    places = [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
     others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
-    return shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *places, *others])
+    return shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *_place(asked), *others])
+
+
+def _place(asked: Mapping[str, Any]) -> list[str]:
+    """What a command says of where runs are, unless that is the usual place."""
+    return [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
 
 
 def study_of(
@@ -182,8 +187,7 @@ def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> st
             continue
         found |= dict.fromkeys(word for word in words if word.startswith("experiment="))
     others = [word for word in found if word.partition("=")[2] not in map(str, sources.values())]
-    places = [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
-    reports = " or ".join(shlex.join(["exneat", "report", word, *places]) for word in others[:3])
+    reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
     return f"there are runs of another experiment: {reports}" if reports else ""
 
 

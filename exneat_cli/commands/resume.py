@@ -25,11 +25,11 @@ def run(line: CommandLine) -> int:
     directory = RunDirectory(check_path("run", plain["run"], "a run directory"))
     settings = read_settings(directory)
     path = directory.path.absolute()
-    settings = replace(settings, resume=True, name=path.parent.name, output=str(directory.path.parent.parent))
     asked = {key: plain[key] for key in ("generations", "tracker") if plain[key] is not None}
-    settings = replace(settings, **asked)
     if "executor" in plain:
-        settings = replace(settings, executor=build(Executor, plain["executor"], "executor."))
+        asked["executor"] = build(Executor, plain["executor"], "executor.")
+    place = str(directory.path.parent.parent)
+    settings = replace(settings, resume=True, name=path.parent.name, output=place, **asked)
     if settings.directory.path.absolute() != path:
         came = f"its settings belong into {settings.directory.path.name}"
         raise ExneatError(f"run={directory.path}: is not where exneat puts such a run: {came}")

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from exneat_cli.errors import ConfigError, ExneatError
-from exneat_cli.records import Manifest, RunDirectory, Score, read_yaml, write_csv
+from exneat_cli.errors import ConfigError, ExneatError, nearest
+from exneat_cli.records import NOT_HASHED, Manifest, RunDirectory, Score, dotted, read_yaml, write_csv
 
 MOST_SETTINGS = 8
 """So many settings have a column on the screen; a CSV file has all of them."""
 _OWN_COLUMNS = ("fitness", "seed", "status", "run")
-_NOT_COMPARED = ("executor", "output", "name", "resume", "checkpoint_every", "seed")
+_NOT_COMPARED = {*NOT_HASHED, "seed"} - {"generations"}
 """Settings without effect on results, and the seed, which has a column anyway."""
 _Row = list[str]
 
@@ -34,7 +33,7 @@ class ListedRun:
         """Read what there is of it."""
         try:
             manifest = directory.read_manifest()
-            settings = dict(_flat(read_yaml(directory.config), ""))
+            settings = dotted(read_yaml(directory.config))
         except ExneatError:
             return cls(directory, "damaged", None, {})
         return cls(directory, directory.status(manifest), manifest, settings)
@@ -59,14 +58,6 @@ class ListedRun:
         if column in _OWN_COLUMNS:
             return str(self.directory.path) if column == "run" else getattr(self, column)
         return self.settings.get(column)
-
-
-def _flat(values: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
 
 
 def differing(runs: Iterable[ListedRun]) -> list[str]:
@@ -102,8 +93,7 @@ def _full_name(column: str, runs: Sequence[ListedRun]) -> str:
         return column
     if len(meant) == 1:
         return meant[0]
-    close = difflib.get_close_matches(column, [*_OWN_COLUMNS, *settings], n=1)
-    fix = f"did you mean {(meant or close)[0]}?" if meant or close else ""
+    fix = f"did you mean {meant[0]}?" if meant else nearest(column, [*_OWN_COLUMNS, *settings])
     raise ConfigError("sort", f"{', '.join(_OWN_COLUMNS)} or a setting of these runs", column, fix)
 
 

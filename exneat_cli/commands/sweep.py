@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -15,11 +15,12 @@ import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting, shipped_directory
+from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting
 from exneat_cli.commands.jobs import BUDGETS, Job, check_known, read_job
 from exneat_cli.commands.publishing import Publisher
 from exneat_cli.commands.run_table import print_table
 from exneat_cli.commands.series import do_jobs, unfinished
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.errors import (
     ConfigError,
     ExneatError,
@@ -32,7 +33,7 @@ from exneat_cli.errors import (
     check_whole,
 )
 from exneat_cli.interruption import signal_heard
-from exneat_cli.records import DONE, build
+from exneat_cli.records import DONE, build, dotted
 from exneat_cli.tasks.contract import check_worlds
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,39}")
@@ -169,19 +170,11 @@ def _condition(key: str, entry: Any) -> Condition:
 
 def _settings(key: str, values: Any) -> dict[str, Any]:
     """Settings by dotted name; sections within sections are spelled out."""
-    flat = dict(_flat(check_section(key, values)))
+    flat = dotted(check_section(key, values))
     for name, value in flat.items():
         if re.split("[./]", name.lstrip("+~"))[0] in _SET_HERE:
             raise ConfigError(f"{key}.{name}", "another setting, since exneat sets this one", value)
     return flat
-
-
-def _flat(values: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from ((f"{name}.{inner}", each) for inner, each in _flat(value))
-        else:
-            yield str(name), value
 
 
 def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -50,6 +51,17 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def as_yaml(content: object) -> str:
     """Write plain data as YAML that also readers of other versions take for what it is: ``1e5`` is text for PyYAML."""
     return yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+
+
+def dotted(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by dotted name; a section within others is spelled out, and one that is empty left out."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{name}.{key}": each for key, each in dotted(value).items()}
+        else:
+            flat[str(name)] = value
+    return flat
 
 
 class _Dumper(yaml.SafeDumper):

@@ -32,7 +32,7 @@ from exneat_cli.records.manifest import (
 )
 from exneat_cli.records.plain import read_json, read_yaml
 
-_NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
+NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
 _TRIES, _PAUSE = 3, 0.02
@@ -50,7 +50,7 @@ def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = Tr
 
 def _identity(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """The settings that are hashed, by dotted key, with 1.0 written as 1: a number is the same however it was typed."""
-    kept = {key: value for key, value in configuration.items() if key not in _NOT_HASHED}
+    kept = {key: value for key, value in configuration.items() if key not in NOT_HASHED}
     text = json.dumps(kept, allow_nan=False, default=str)
     flat: dict[str, Any] = json.loads(text, object_pairs_hook=_flat, parse_float=_shortest)
     return flat

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import importlib
 import json
@@ -19,7 +18,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from exneat_cli.errors import ConfigError, ExneatError
+from exneat_cli.errors import ConfigError, ExneatError, nearest
 from exneat_cli.tasks.user_code import make_findable
 
 
@@ -135,10 +134,8 @@ def _import(module: str, env_id: str) -> None:
 
 
 def _unknown(env_id: str) -> ConfigError:
-    close = difflib.get_close_matches(env_id.rpartition(":")[2], gymnasium.registry, n=1, cutoff=0.5)
-    fix = (
-        f"did you mean {close[0]}?" if close else "python -c 'import gymnasium; gymnasium.pprint_registry()' lists them"
-    )
+    fix = nearest(env_id.rpartition(":")[2], gymnasium.registry, 0.5)
+    fix = fix or "python -c 'import gymnasium; gymnasium.pprint_registry()' lists them"
     return ConfigError("task.env_id", "the id of a registered environment, with its version", env_id, fix)
 
 

@@ -14,7 +14,7 @@ import yaml
 from exneat_cli.algorithms import RECURRENT, ArrayGenome, neat_config, to_stock
 from exneat_cli.algorithms.neat.subpopulation import Subpopulation
 from exneat_cli.brains import assemble
-from exneat_cli.commands.command_line import shipped_directory
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import EpisodeSeeds, stream, training_episodes

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from exneat_cli.commands.command_line import read_command_line, shipped_directory
+from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import read_job
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.main import main
 from exneat_cli.records import RobustnessRow, RunDirectory, read_robustness
 from exneat_cli.rollouts import Noise, perturbed

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
-from exneat_cli.commands.command_line import shipped_directory
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.commands.sweep import Experiment, experiment_names, read_experiment
 from exneat_cli.main import main
 

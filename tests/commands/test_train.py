@@ -19,8 +19,9 @@ import pytest
 import yaml
 
 import exneat_cli
-from exneat_cli.commands.command_line import read_command_line, shipped_directory
+from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import read_job
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.main import COMMANDS, main
 from exneat_cli.records import RunDirectory
 from exneat_cli.runs import RunSettings

@@ -12,7 +12,7 @@ import yaml
 from exneat_cli.algorithms import RECURRENT, Coevolution, EvolutionSettings, Problem, Results
 from exneat_cli.brains import Brains, assemble
 from exneat_cli.brains.brain import activate, memory_size
-from exneat_cli.commands.command_line import shipped_directory
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.runs.training import Training

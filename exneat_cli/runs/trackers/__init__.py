@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import msgspec
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import HistoryRow, Result, RunDirectory
+from exneat_cli.records import HistoryRow, Result, RunDirectory, dotted
 
 TRACKERS = ("tensorboard", "wandb", "mlflow")
 """What ``tracker=`` may be, each with a file, a library and an extra of that name."""
@@ -63,7 +63,11 @@ class Tracking:
 
     def result(self, result: Result) -> None:
         """Tell what came of the run."""
-        figures = dict(_flat("", msgspec.to_builtins(result)))
+        figures = {
+            key.replace(".", "/"): float(value)
+            for key, value in dotted(msgspec.to_builtins(result)).items()
+            if isinstance(value, int | float)
+        }
         self._each(lambda tracker: tracker.result(figures))
 
     def pictures(self, run: RunDirectory) -> None:
@@ -110,20 +114,3 @@ def tracked(names: Sequence[str]) -> Iterator[Tracking]:
         yield tracking
     finally:
         tracking.close()
-
-
-def flat_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their dotted keys."""
-    return {key.replace("/", "."): value for key, value in _leaves("", settings)}
-
-
-def _leaves(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(f"{prefix}{key}/", value)
-        else:
-            yield f"{prefix}{key}", value
-
-
-def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    return ((key, float(value)) for key, value in _leaves(prefix, values) if isinstance(value, int | float))

@@ -14,8 +14,7 @@ from typing import Any
 from mlflow.entities import Metric, Param
 from mlflow.tracking import MlflowClient
 
-from exneat_cli.records import HistoryRow, RunDirectory, configuration_hash
-from exneat_cli.runs.trackers import flat_settings
+from exneat_cli.records import HistoryRow, RunDirectory, configuration_hash, dotted
 
 _TAG = "exneat.run"
 _MOST_PARAMS, _LONGEST_PARAM = 100, 500  # in one request, which MLflow sets
@@ -40,7 +39,7 @@ class OneRun:
             self._client.update_run(self._id, "RUNNING")
         else:
             self._id = self._client.create_run(place, run_name=run.path.name, tags={_TAG: mark}).info.run_id
-            params = [Param(key, str(value)[:_LONGEST_PARAM]) for key, value in flat_settings(settings).items()]
+            params = [Param(key, str(value)[:_LONGEST_PARAM]) for key, value in dotted(settings).items()]
             for first in range(0, len(params), _MOST_PARAMS):
                 self._client.log_batch(self._id, params=params[first : first + _MOST_PARAMS])
         known = {column: self._steps(column) for column in (history[0] if found and history else ())}

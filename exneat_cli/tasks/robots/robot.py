@@ -79,8 +79,8 @@ class RobotTask(Task):
     fitness_decimals: ClassVar[int] = 1
     failure_floor: ClassVar[float] = -100.0
     trace_columns: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    drawn_by_mujoco: ClassVar[bool] = True
     """Position of the trunk in metres."""
+    drawn_by_mujoco: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_choice("task.part_order", self.part_order, ["position", "model"])

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from exneat_cli.algorithms import RECURRENT, EvolutionSettings
-from exneat_cli.commands.command_line import shipped_directory
+from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.errors import ConfigError
 
 
