@@ -1,28 +1,28 @@
 """The kernel of `exneat_cli.brains.brain` for many brains side by side, in single precision, by Warp."""
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
+
+from exneat_cli.brains.brain import Brains
 
 wp.set_module_options({"enable_backward": False})
 
 
-@wp.struct
-class Programs:
-    """Brains as in `exneat_cli.brains.Brains`, laid out in S slots of equal size: each array has a row per slot."""
+FIELDS = Brains._fields[1:]
+_SIZE, _RECURRENT, _FIRST_NODE, _FIRST_LINK, _NODE_SLOT, _EDGE_START, _EDGE_SOURCE = map(wp.constant, range(7))
+_EDGE_WEIGHT, _BIAS, _RESPONSE, _ACTIVATION, _LINK_SLOT, _LINK_SOURCE, _OUTPUT_SLOT = map(wp.constant, range(7, 14))
 
-    size: wp.array2d(dtype=int)
-    recurrent: wp.array2d(dtype=int)
-    first_node: wp.array2d(dtype=int)
-    first_link: wp.array2d(dtype=int)
-    node_slot: wp.array2d(dtype=int)
-    edge_start: wp.array2d(dtype=int)
-    edge_source: wp.array2d(dtype=int)
-    edge_weight: wp.array2d(dtype=float)
-    bias: wp.array2d(dtype=float)
-    response: wp.array2d(dtype=float)
-    activation: wp.array2d(dtype=int)
-    link_slot: wp.array2d(dtype=int)
-    link_source: wp.array2d(dtype=int)
-    output_slot: wp.array3d(dtype=int)
+
+def packed(brains: Brains) -> NDArray[np.int32]:
+    """All of `brains` as one row of words, so that one copy brings them: where each of `FIELDS` begins, then those.
+
+    Fractions are in single precision, by their bits.
+    """
+    columns = [np.ravel(getattr(brains, name)) for name in FIELDS]
+    begins = len(FIELDS) + np.cumsum([0, *map(len, columns)])[:-1]
+    words = (each.astype(np.float32).view(np.int32) if each.dtype.kind == "f" else each for each in columns)
+    return np.concatenate([begins, *words]).astype(np.int32)
 
 
 @wp.func
@@ -38,32 +38,41 @@ def _activation(code: int, value: float):
 
 @wp.kernel
 def activate(
-    programs: Programs,
+    programs: wp.array2d(dtype=int),
     slots: wp.array(dtype=int),
     brains: wp.array(dtype=int),
     memory: wp.array2d(dtype=float),
     action: wp.array2d(dtype=float),
 ):
-    """One step of each world's brain, `brains` in `slots`, -1 for none; see `exneat_cli.brains.brain.activate`."""
+    """One step of each world's brain, see `exneat_cli.brains.brain.activate`.
+
+    Each slot has a row of `programs`, as `packed` made it; a world's brain is number `brains` of `slots`, -1 for none.
+    """
     w = wp.tid()
     s, b = slots[w], brains[w]
     if b < 0:
         return
-    for i in range(programs.first_link[s, b], programs.first_link[s, b + 1]):
-        memory[w, programs.link_slot[s, i]] = memory[w, programs.link_source[s, i]]
-    first, last = programs.first_node[s, b], programs.first_node[s, b + 1]
-    recurrent, scratch = programs.recurrent[s, b] != 0, programs.size[s, b] - first
+    link_slot, link_source = programs[s, _LINK_SLOT], programs[s, _LINK_SOURCE]
+    for i in range(programs[s, programs[s, _FIRST_LINK] + b], programs[s, programs[s, _FIRST_LINK] + b + 1]):
+        memory[w, programs[s, link_slot + i]] = memory[w, programs[s, link_source + i]]
+    first, last = programs[s, programs[s, _FIRST_NODE] + b], programs[s, programs[s, _FIRST_NODE] + b + 1]
+    recurrent = programs[s, programs[s, _RECURRENT] + b] != 0
+    scratch = programs[s, programs[s, _SIZE] + b] - first
+    start, source, weight = programs[s, _EDGE_START], programs[s, _EDGE_SOURCE], programs[s, _EDGE_WEIGHT]
+    slot, bias, response = programs[s, _NODE_SLOT], programs[s, _BIAS], programs[s, _RESPONSE]
     for node in range(first, last):
         total = float(0.0)
-        for edge in range(programs.edge_start[s, node], programs.edge_start[s, node + 1]):
-            total += memory[w, programs.edge_source[s, edge]] * programs.edge_weight[s, edge]
-        value = _activation(programs.activation[s, node], programs.bias[s, node] + programs.response[s, node] * total)
+        for edge in range(programs[s, start + node], programs[s, start + node + 1]):
+            total += memory[w, programs[s, source + edge]] * wp.cast(programs[s, weight + edge], float)
+        total = wp.cast(programs[s, bias + node], float) + wp.cast(programs[s, response + node], float) * total
+        value = _activation(programs[s, programs[s, _ACTIVATION] + node], total)
         if recurrent:
             memory[w, scratch + node] = value
         else:
-            memory[w, programs.node_slot[s, node]] = value
+            memory[w, programs[s, slot + node]] = value
     if recurrent:
         for node in range(first, last):
-            memory[w, programs.node_slot[s, node]] = memory[w, scratch + node]
+            memory[w, programs[s, slot + node]] = memory[w, scratch + node]
+    first_output = programs[s, _OUTPUT_SLOT] + b * action.shape[1]
     for i in range(action.shape[1]):
-        action[w, i] = memory[w, programs.output_slot[s, b, i]]
+        action[w, i] = memory[w, programs[s, first_output + i]]

@@ -30,7 +30,7 @@ from exneat_cli.tasks import TASKS
 from exneat_cli.tasks.user_code import NAMED
 from exneat_cli.wiring import LINKAGES
 
-MOST_SIDE_BY_SIDE = 256
+MOST_SIDE_BY_SIDE = 1024
 """So many runs train at once on one GPU."""
 _REGISTRIES: tuple[Any, ...] = (TASKS, ALGORITHMS, LINKAGES, NAMED)
 """What a program or its user may have added to, and a worker, which runs another program, must know too."""

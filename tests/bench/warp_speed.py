@@ -6,11 +6,13 @@ All of it takes less than ten minutes on one large GPU; sizes are options, so th
 from __future__ import annotations
 
 import functools
+import multiprocessing
 import tempfile
+import threading
 import time
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import mannwhitneyu
@@ -38,6 +40,7 @@ class Sizes:
         worlds: of the comparison with bare physics, and of whole evolution.
         queued: episodes for each world in a generation of whole evolution: a run waits for its longest one, and others
             use its worlds meanwhile.
+        seconds: that whole evolution is watched for.
         memory_worlds: of which the memory is measured.
         runs, generations, population: of the training side by side.
         cpu_runs: of the same on the CPU, whose test figures are compared.
@@ -46,7 +49,8 @@ class Sizes:
     """
 
     worlds: int = 4000
-    queued: int = 8
+    queued: int = 16
+    seconds: int = 45
     memory_worlds: int = 5000
     runs: int = 10
     generations: int = 100
@@ -70,29 +74,33 @@ def settings_of(sizes: Sizes, seed: int, **changes: object) -> RunSettings:
 
 
 def measure_evolution(sizes: Sizes) -> Row:
-    """Environment steps a second of runs side by side whose episodes fill the worlds, evolution and all."""
+    """Environment steps a second of runs side by side whose episodes fill the worlds, in the midst of evolution."""
     count = max(1, sizes.queued * sizes.worlds // sizes.population)
     executor = Executor("warp", worlds=sizes.worlds, device=sizes.device)
-    trainings = [Training.start(settings_of(sizes, FIRST_SEED + k, generations=4)) for k in range(count)]
+    trainings = [Training.start(settings_of(sizes, FIRST_SEED + k)) for k in range(count)]
+    is_over = threading.Event()
     with keep_workers(), ThreadPoolExecutor(count) as pool:
-        runners = [Runner(each.settings.task, each.settings.noise, executor, training=True) for each in trainings]
 
-        def advance(k: int, generations: int) -> None:
-            for _ in range(generations):
-                trainings[k].advance(runners[k])
+        def evolve(training: Training) -> None:
+            with Runner(training.settings.task, training.settings.noise, executor, training=True) as runner:
+                while not (is_over.is_set() or training.is_over):
+                    training.advance(runner)
 
-        list(pool.map(functools.partial(advance, generations=1), range(count)))  # compiles
+        runs = [pool.submit(evolve, training) for training in trainings]
+        while not all(training.history for training in trainings) and not any(run.done() for run in runs):
+            time.sleep(0.1)  # the first generation compiles
         before, began = _steps(trainings), time.perf_counter()
-        list(pool.map(functools.partial(advance, generations=3), range(count)))
-        seconds = time.perf_counter() - began
-        for runner in runners:
-            runner.__exit__(None)
-    speed = (_steps(trainings) - before) / seconds
-    return Row(f"whole evolution, {count} runs side by side", STEPS_A_SECOND, [speed], SPEED_BAR)
+        wait(runs, timeout=sizes.seconds, return_when=FIRST_COMPLETED)
+        did, seconds = _steps(trainings) - before, time.perf_counter() - began
+        is_over.set()
+        for run in runs:
+            run.result()
+    note = f"{did} steps in {seconds:.0f} s"
+    return Row(f"whole evolution, {count} runs side by side", STEPS_A_SECOND, [did / seconds], SPEED_BAR, note)
 
 
 def _steps(trainings: Iterable[Training]) -> int:
-    return sum(int(training.history[-1]["env_steps"]) for training in trainings)
+    return sum(int(training.history[-1]["env_steps"]) for training in trainings if training.history)
 
 
 def compare_with_bare_steps(sizes: Sizes) -> Row:
@@ -101,7 +109,7 @@ def compare_with_bare_steps(sizes: Sizes) -> Row:
     import warp as wp
 
     stage, worlds = _filled_stage(sizes, sizes.worlds)
-    stage.run(STEADY_STEPS)
+    _do_steps(stage, STEADY_STEPS)
     model, data = worlds.model, worlds.data
     state = [(array, array.numpy()) for array in (data.qpos, data.qvel, data.qacc_warmstart, data.ctrl)]
 
@@ -109,7 +117,7 @@ def compare_with_bare_steps(sizes: Sizes) -> Row:
         for _ in range(5):
             mujoco_warp.step(model, data)
 
-    ours = _seconds_per_call(lambda: stage.run(1), 40)
+    ours = _seconds_per_call(lambda: _do_steps(stage, 1), 40)
     for array, values in state:
         array.assign(values)
     model.callback.contactfilter = model.callback.control = None
@@ -125,6 +133,11 @@ def compare_with_bare_steps(sizes: Sizes) -> Row:
         bare_seconds = _seconds_per_call(reference, 4)  # type: ignore[arg-type]
     note = f"{sizes.worlds / ours:,.0f} against {sizes.worlds / bare_seconds:,.0f} control steps a second"
     return Row("whole control steps over bare steps", RATIO, [bare_seconds / ours], OVERHEAD_BAR, note)
+
+
+def _do_steps(stage, steps: int) -> None:  # type: ignore[no-untyped-def]
+    stage.launch(steps)
+    stage.look()
 
 
 def _seconds_per_call(work: object, calls: int) -> float:
@@ -161,26 +174,27 @@ def measure_device_memory(sizes: Sizes) -> Row:
     device = wp.get_device(sizes.executor.device_name)
     before = device.free_memory if device.is_cuda else 0
     stage, _ = _filled_stage(sizes, sizes.memory_worlds)
-    stage.run(2)
+    _do_steps(stage, 2)
     wp.synchronize()
     taken = (before - device.free_memory) / 1e6 if device.is_cuda else 0.0
     return Row(f"memory at {sizes.memory_worlds} worlds", MEGABYTES, [taken], None, str(device.name))
 
 
 def compare_with_cpu(sizes: Sizes) -> tuple[Row, ...]:
-    """Seconds of runs side by side, and the distribution of their test figures beside that of runs on the CPU."""
-    with tempfile.TemporaryDirectory() as directory:
+    """Seconds of runs side by side, and the distribution of their test figures beside that of runs on the CPU.
 
-        def figure(seed: int, executor: Executor) -> float:
-            done = train(settings_of(sizes, seed, executor=executor, output=directory, name=executor.name))
-            return done.result.champion.fitness_mean
-
+    Those on the CPU go on meanwhile, each in a process of its own.
+    """
+    spawning = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory() as directory, ProcessPoolExecutor(mp_context=spawning) as cores:
+        asked = [settings_of(sizes, FIRST_SEED + k, output=directory, name="warp") for k in range(sizes.runs)]
+        others = [replace(each, executor=Executor("serial"), name="cpu") for each in asked[: sizes.cpu_runs]]
+        waiting = [cores.submit(_figure, each) for each in others]
         began = time.perf_counter()
         with keep_workers(), ThreadPoolExecutor(sizes.runs) as pool:
-            seeds = range(FIRST_SEED, FIRST_SEED + sizes.runs)
-            on_gpu = list(pool.map(functools.partial(figure, executor=sizes.executor), seeds))
+            on_gpu = list(pool.map(_figure, asked))
         seconds = time.perf_counter() - began
-        on_cpu = [figure(FIRST_SEED + k, Executor()) for k in range(sizes.cpu_runs)]
+        on_cpu = [each.result() for each in waiting]
     budget = f"{sizes.runs} runs x {sizes.generations} generations x {sizes.population} teams"
     rows = [Row(f"{budget}, side by side", SECONDS, [seconds], SECONDS_BAR, f"test figures {np.round(on_gpu, 1)}")]
     if on_cpu:
@@ -188,3 +202,7 @@ def compare_with_cpu(sizes: Sizes) -> tuple[Row, ...]:
         note = f"on the CPU {np.round(on_cpu, 1)}"
         rows.append(Row("Mann-Whitney p of test figures, GPU and CPU", RATIO, [p], Bar(0.05, True), note))
     return tuple(rows)
+
+
+def _figure(settings: RunSettings) -> float:
+    return train(settings).result.champion.fitness_mean

@@ -20,13 +20,11 @@ FEED_FORWARD = busy(EvolutionSettings(), weight_init_stdev=0.2)
 
 def actions_on_warp(brains: Brains, sensed: np.ndarray) -> np.ndarray:
     """(brains, steps, A) what all of them do from their starts on, given (steps, sensed size)."""
-    from exneat_cli.brains.batch import Programs, activate
+    from exneat_cli.brains.batch import activate, packed
 
-    count, programs = len(brains.size), Programs()
+    count = len(brains.size)
     with wp.ScopedDevice("cpu"):
-        for name in Brains._fields[1:]:
-            values = getattr(brains, name)[np.newaxis]
-            setattr(programs, name, wp.array(values.astype(np.float32 if values.dtype.kind == "f" else np.int32)))
+        programs = wp.array(packed(brains)[np.newaxis])
         memory = wp.zeros((count, memory_size(brains)), dtype=float)
         action = wp.zeros((count, brains.output_slot.shape[1]), dtype=float)
         slots, which = wp.zeros(count, dtype=int), wp.array(np.arange(count, dtype=np.int32))

@@ -21,14 +21,11 @@ _LOW_WORD = wp.constant(wp.uint64(0xFFFFFFFF))
 
 @wp.struct
 class Jobs:
-    """Queued jobs: those from head to tail wait; and where each stands in the outcomes of its slot."""
+    """Queued jobs, of which those from head to tail wait: slot, brain, episode and place in the slot's outcomes."""
 
     head: wp.array(dtype=int)
     tail: wp.array(dtype=int)
-    slot: wp.array(dtype=int)
-    brain: wp.array(dtype=int)
-    episode: wp.array(dtype=int)
-    place: wp.array(dtype=int)
+    queue: wp.array(dtype=wp.vec4i)
 
 
 @wp.struct
@@ -79,11 +76,11 @@ def take_jobs(
             doing.brain[w] = -1
             begins[w] = 0
         return
-    k = k % jobs.slot.shape[0]
-    doing.slot[w] = jobs.slot[k]
-    doing.brain[w] = jobs.brain[k]
-    doing.episode[w] = jobs.slot[k] * episodes_per_slot + jobs.episode[k]
-    doing.place[w] = jobs.place[k]
+    job = jobs.queue[k % jobs.queue.shape[0]]
+    doing.slot[w] = job[0]
+    doing.brain[w] = job[1]
+    doing.episode[w] = job[0] * episodes_per_slot + job[2]
+    doing.place[w] = job[3]
     doing.steps[w] = 0
     for i in range(doing.totals.shape[1]):
         doing.totals[w, i] = wp.float64(0.0)

@@ -24,7 +24,7 @@ STEPS_AT_ONCE = 8
 """Control steps between two looks at what has ended."""
 GATHERING_SECONDS = 0.02
 """How long an idle batch waits for requests of other runs before it begins."""
-MOST_SLOTS = 512
+MOST_SLOTS = 1024
 
 Setup = tuple[Task, Noise, bool]
 
@@ -149,12 +149,14 @@ class _Batch:
         assert stage is not None or not waiting
         if stage is None:
             return
+        if self._running:
+            stage.launch(STEPS_AT_ONCE)  # what follows prepares more work meanwhile
         if len(waiting) <= self._slots - len(self._running):  # else all wait until there are more slots
             free = [slot for slot in range(self._slots) if slot not in self._running]
             for slot, request in zip(free, waiting, strict=False):
                 stage.put(slot, request.brains, request.episodes)
                 self._running[slot] = request
-        ended, lacked_room = stage.run(STEPS_AT_ONCE)
+        ended, lacked_room = stage.look()
         if lacked_room:
             self._double_room()
             return

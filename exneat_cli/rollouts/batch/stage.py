@@ -14,10 +14,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from exneat_cli.brains import Brains
-from exneat_cli.brains.batch import Programs, activate
+from exneat_cli.brains.batch import activate, packed
 from exneat_cli.brains.brain import memory_size
 from exneat_cli.rollouts.batch import kernels
 from exneat_cli.rollouts.batch.kernels import IDLE, Doing, Jobs, Outcome
+from exneat_cli.rollouts.batch.mirrored import Mirrored, widened
 from exneat_cli.rollouts.episode import Tally
 from exneat_cli.seeding import EpisodeSeeds
 
@@ -44,19 +45,19 @@ class Stage:
         self.device = worlds.status.device
         self._graph: Any = None
         with wp.ScopedDevice(self.device):
-            self._programs = Programs()
-            for name in Brains._fields[1:]:
-                kind = float if name in ("edge_weight", "bias", "response") else int
-                shape = (slots, 1, action_size) if name == "output_slot" else (slots, 1)
-                setattr(self._programs, name, wp.zeros(shape, dtype=kind))
-            self._keys = wp.zeros((slots, 2), dtype=wp.uint32)
-            self._starts = wp.array(np.tile(worlds.resting_start(), (1 + slots, 1)))
+            self._programs = Mirrored(np.zeros((slots, 1), np.int32))
+            self._keys = Mirrored(np.zeros((slots, 2), np.uint32))
+            self._starts = Mirrored(np.tile(worlds.resting_start(), (1 + slots, 1)))
+            self._queue = Mirrored(np.zeros((1, 4), np.int32), wp.vec4i)
+            self._tail = Mirrored(np.zeros(1, np.int32))
             self._episodes = 1
             self._memory = wp.zeros((count, sensed_size + 1), dtype=float)
             framed = worlds.readings_size != sensed_size or worlds.is_framed
             self._readings = wp.zeros((count, worlds.readings_size), dtype=float) if framed else None
             self._action = wp.zeros((count, action_size), dtype=float)
-            self._jobs = _struct(Jobs(), 1, int, "head", "tail", "slot", "brain", "episode", "place")
+            self._jobs = Jobs()
+            self._jobs.head = wp.zeros(1, dtype=int)
+            self._jobs.tail, self._jobs.queue = self._tail.there, self._queue.there
             self._doing = _struct(Doing(), count, int, "slot", "brain", "episode", "place", "steps")
             self._doing.totals = wp.zeros((count, terms), dtype=wp.float64)
             self._doing.brain.fill_(-1)
@@ -66,37 +67,29 @@ class Stage:
             self._overflow = wp.zeros(1, dtype=int)
             worlds.status.fill_(IDLE)
             self._program()  # compiles and loads all kernels, which a capture must not
-        self._tail = 0
 
     def put(self, slot: int, brains: Brains, episodes: Sequence[EpisodeSeeds]) -> None:
         """Queue every brain in every episode; whatever had the slot before must be done."""
-        count, jobs = len(brains.size), len(brains.size) * len(episodes)
+        programs, count = packed(brains), len(brains.size)
+        jobs = np.empty((count * len(episodes), 4), np.int32)
+        jobs[:, 0], jobs[:, 3] = slot, np.arange(len(jobs))
+        jobs[:, 1], jobs[:, 2] = jobs[:, 3] % count, jobs[:, 3] // count
         with wp.ScopedDevice(self.device):
-            self._make_room(brains, len(episodes), jobs)
-            for name in Brains._fields[1:]:
-                _write(getattr(self._programs, name), slot, getattr(brains, name))
-            starts = self._worlds.starts(episodes)
-            first = slot * self._episodes
-            wp.copy(self._starts, wp.array(starts), dest_offset=(1 + first) * starts.shape[1], count=starts.size)
-            keys = np.array([each.sensor_noise.generate_state(2, np.uint32) for each in episodes], np.uint32)
-            wp.copy(self._keys, wp.array(keys, dtype=wp.uint32), dest_offset=2 * first, count=keys.size)
-            ended = self._outcome.ended.numpy()
-            ended[slot] = 0
-            self._outcome.ended.assign(ended)
-            numbers = np.arange(jobs)
-            columns = {"slot": np.full(jobs, slot), "place": numbers}
-            columns |= {"brain": numbers % count, "episode": numbers // count}
-            room = self._jobs.slot.shape[0]
-            place = (self._tail + numbers) % room
-            for name, values in columns.items():
-                queued = getattr(self._jobs, name).numpy()
-                queued[place] = values
-                getattr(self._jobs, name).assign(queued)
-            self._tail += jobs
-            self._jobs.tail.assign([self._tail])
+            self._make_room(len(programs), memory_size(brains), len(episodes), len(jobs))
+            self._programs.write(slot, programs)
+            keys = [each.sensor_noise.generate_state(2, np.uint32) for each in episodes]
+            self._keys.write(slot * self._episodes, np.array(keys, np.uint32))
+            self._starts.write(1 + slot * self._episodes, self._worlds.starts(episodes))
+            self._outcome.ended[slot : slot + 1].zero_()
+            tail, room = int(self._tail.here[0]), len(self._queue.here)
+            until_end = room - tail % room
+            self._queue.write(tail % room, jobs[:until_end])
+            if len(jobs) > until_end:
+                self._queue.write(0, jobs[until_end:])
+            self._tail.write(0, np.array([tail + len(jobs)]))
 
-    def run(self, steps: int) -> tuple[NDArray[np.int32], bool]:
-        """Do some control steps; returns (S,) how many episodes of each slot have ended, and whether room ran out."""
+    def launch(self, steps: int) -> None:
+        """Have the device do some control steps; waits for none of them."""
         with wp.ScopedDevice(self.device):
             if self.device.is_cuda and self._graph is None:
                 with wp.ScopedCapture() as capture:
@@ -108,7 +101,10 @@ class Stage:
                 else:
                     self._program()
             self.control_steps += steps
-            return self._outcome.ended.numpy(), bool(self._overflow.numpy()[0])
+
+    def look(self) -> tuple[NDArray[np.int32], bool]:
+        """(S,) how many episodes of each slot have ended when all that was launched is done; whether room ran out."""
+        return self._outcome.ended.numpy(), bool(self._overflow.numpy()[0])
 
     def fetch(self, slot: int, tally: Tally) -> None:
         """Write what came of a slot whose episodes have all ended."""
@@ -124,67 +120,57 @@ class Stage:
         readings = memory if self._readings is None else self._readings
         taking = [self._jobs, doing, worlds.status, worlds.begins, self._episodes, memory]
         wp.launch(kernels.take_jobs, dim=count, inputs=taking)
-        worlds.reset(self._starts)
+        worlds.reset(self._starts.there)
         worlds.observe(readings)
         if self._sd > 0.0:
             size = worlds.readings_size
-            wp.launch(kernels.disturb, dim=(count, -(-size // 4)), inputs=[self._keys, doing, self._sd, size, readings])
+            wp.launch(
+                kernels.disturb, dim=(count, -(-size // 4)), inputs=[self._keys.there, doing, self._sd, size, readings]
+            )
         worlds.sense(readings, memory)
-        wp.launch(activate, dim=count, inputs=[self._programs, doing.slot, doing.brain, memory, self._action])
+        wp.launch(activate, dim=count, inputs=[self._programs.there, doing.slot, doing.brain, memory, self._action])
         worlds.drive(self._action)
         worlds.step()
         wp.launch(kernels.keep_count, dim=count, inputs=[worlds.status, worlds.terms, doing, self._outcome])
         worlds.note_overflows(self._overflow)
 
-    def _make_room(self, brains: Brains, episodes: int, jobs: int) -> None:
+    def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
         """Enlarge what is too small; what is there stays, and the program is captured anew."""
-        grown = False
-        for name in Brains._fields[1:]:
-            array = getattr(self._programs, name)
-            needed = len(getattr(brains, name))
-            if needed > array.shape[1]:
-                setattr(self._programs, name, _grown(array, (array.shape[0], _ample(needed), *array.shape[2:])))
-                grown = True
-        if memory_size(brains) > self._memory.shape[1]:
-            self._memory = _grown(self._memory, (self._memory.shape[0], _ample(memory_size(brains))))
-            grown = True
-        if episodes > self._episodes:
-            grown = True
+        slots, room = self._slots, self._outcome.status.shape[1]
+        is_short = words > self._programs.here.shape[1], memory > self._memory.shape[1], episodes > self._episodes
+        if any(is_short) or jobs > room:
+            self._graph = None
+        if is_short[0]:
+            self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
+        if is_short[1]:
+            self._memory = _grown(self._memory, (self._memory.shape[0], _ample(memory)))
+        if is_short[2]:
             self._grow_episodes(episodes)
-        if jobs > self._outcome.status.shape[1]:
-            grown = True
-            places = _ample(jobs)
+        if jobs > room:
             for name in ("status", "steps", "totals"):
                 array = getattr(self._outcome, name)
-                setattr(self._outcome, name, _grown(array, (array.shape[0], places, *array.shape[2:])))
-            self._grow_queue(places)
-        if grown:
-            self._graph = None
+                setattr(self._outcome, name, _grown(array, (slots, _ample(jobs), *array.shape[2:])))
+            self._grow_queue(slots * _ample(jobs))
 
     def _grow_episodes(self, episodes: int) -> None:
         before, slots = self._episodes, self._slots
-        starts, keys = self._starts.numpy(), self._keys.numpy().reshape(slots, before, 2)
+        starts, keys = self._starts.here, self._keys.here.reshape(slots, before, 2)
         spread = np.tile(starts[0], (slots, episodes, 1))
         spread[:, :before] = starts[1:].reshape(slots, before, -1)
-        self._starts = wp.array(np.concatenate([starts[:1], spread.reshape(slots * episodes, -1)]))
-        wider = np.zeros((slots, episodes, 2), np.uint32)
-        wider[:, :before] = keys
-        self._keys = wp.array(wider.reshape(-1, 2), dtype=wp.uint32)
+        self._starts = self._starts.resized(np.concatenate([starts[:1], spread.reshape(slots * episodes, -1)]))
+        self._keys = self._keys.resized(widened(keys, (slots, episodes, 2)).reshape(-1, 2))
         of_world = self._doing.episode.numpy()
         self._doing.episode.assign(of_world // before * episodes + of_world % before)
         self._episodes = episodes
 
-    def _grow_queue(self, places: int) -> None:
+    def _grow_queue(self, room: int) -> None:
         """Room for all slots to be full; what waits moves to the front."""
-        head, room = int(self._jobs.head.numpy()[0]), self._jobs.slot.shape[0]
-        waiting = (head + np.arange(self._tail - head)) % room
-        for name in ("slot", "brain", "episode", "place"):
-            values = np.zeros(self._slots * places, np.int32)
-            values[: len(waiting)] = getattr(self._jobs, name).numpy()[waiting]
-            setattr(self._jobs, name, wp.array(values))
-        self._tail -= head
-        self._jobs.head.assign([0])
-        self._jobs.tail.assign([self._tail])
+        head, tail = int(self._jobs.head.numpy()[0]), int(self._tail.here[0])
+        waiting = self._queue.here[(head + np.arange(tail - head)) % len(self._queue.here)]
+        self._queue = self._queue.resized(widened(waiting, (room, 4)))
+        self._jobs.queue = self._queue.there
+        self._jobs.head.zero_()
+        self._tail.write(0, np.array([len(waiting)]))
 
 
 def _struct(struct: Any, shape: Any, dtype: type, *names: str) -> Any:
@@ -199,14 +185,4 @@ def _ample(size: int) -> int:
 
 
 def _grown(array: Any, shape: tuple[int, ...]) -> Any:
-    values = np.zeros(shape, array.numpy().dtype)
-    values[tuple(slice(size) for size in array.shape)] = array.numpy()
-    return wp.array(values, dtype=array.dtype)
-
-
-def _write(array: Any, slot: int, values: NDArray[Any]) -> None:
-    kind = np.float32 if values.dtype.kind == "f" else np.int32
-    flat = wp.array(np.ascontiguousarray(values.astype(kind)).reshape(-1))
-    row = int(np.prod(array.shape[1:]))
-    if flat.size:
-        wp.copy(array.flatten(), flat, dest_offset=slot * row, count=flat.size)
+    return wp.array(widened(array.numpy(), shape), dtype=array.dtype)
