@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
-import hashlib
-import json
 import os
 import shutil
 import time
@@ -20,6 +18,7 @@ import msgspec
 
 from exneat_cli.errors import ExneatError
 from exneat_cli.records.files import delete, make_directory, write_json, write_whole
+from exneat_cli.records.identity import identity
 from exneat_cli.records.manifest import (
     CHANGED_WORLDS,
     DONE,
@@ -32,40 +31,9 @@ from exneat_cli.records.manifest import (
 )
 from exneat_cli.records.plain import read_json, read_yaml
 
-NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
-"""Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
 _TRIES, _PAUSE = 3, 0.02
 """How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
-
-
-def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
-    """SHA-256, in hex, of the settings that results depend on, but for the number of generations.
-
-    Without the seed, all runs of one variant share a hash.
-    """
-    kept = {key: value for key, value in _identity(configuration).items() if with_seed or key != "seed"}
-    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
-
-
-def _identity(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings that are hashed, by dotted key, with 1.0 written as 1: a number is the same however it was typed."""
-    kept = {key: value for key, value in configuration.items() if key not in NOT_HASHED}
-    text = json.dumps(kept, allow_nan=False, default=str)
-    flat: dict[str, Any] = json.loads(text, object_pairs_hook=_flat, parse_float=_shortest)
-    return flat
-
-
-def _flat(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in pairs:
-        flat |= {f"{key}.{inner}": v for inner, v in value.items()} if isinstance(value, dict) else {key: value}
-    return flat
-
-
-def _shortest(text: str) -> int | float:
-    number = float(text)
-    return int(number) if number.is_integer() else number
 
 
 @dataclass(unsafe_hash=True)
@@ -171,10 +139,10 @@ class RunDirectory:
     def _difference(self, configuration: Mapping[str, Any]) -> str:
         """What the run that is there has otherwise, in words."""
         try:
-            there = _identity(read_yaml(self.config))
+            there = identity(read_yaml(self.config))
         except (ExneatError, TypeError, ValueError):
             return "its config.yaml cannot be read"
-        here = _identity(configuration)
+        here = identity(configuration)
         keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
         named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
         return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
@@ -182,7 +150,7 @@ class RunDirectory:
     def is_alike(self, configuration: Mapping[str, Any]) -> bool:
         """Whether the run has these settings, word for word."""
         try:
-            return _identity(read_yaml(self.config)) == _identity(configuration)
+            return identity(read_yaml(self.config)) == identity(configuration)
         except (ExneatError, TypeError, ValueError):
             return False
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.brains import places_in_memory
+from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion
 from exneat_cli.rollouts import Noise, Sweep, perturbed, record
@@ -69,7 +70,9 @@ def record_champion(
     if sweep is not None:
         task, noise = perturbed(task, noise, sweep, sweep.levels[0])
     task, period = task.drawable(), task.step_seconds
-    assert isinstance(task, HasPicture)
+    if not isinstance(task, HasPicture):
+        fix = "a class of yours is watched once it has the methods snapshot() and camera(), see HasPicture"
+        raise ExneatError(f"task={task.name}: expected a task whose worlds can be drawn\n  {fix}")
     every = 1 if period is None else max(1, round(1.0 / ((fps or BODY_FPS) * period)))
     recording = record(task, noise, champion.brain(), _seeds(episode, seed), steps, every)
     places = places_in_memory(

@@ -5,18 +5,7 @@ Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/Trac
 
 import gymnasium
 
-from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
-from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
-from exneat_cli.tasks.grid.world import GridTask
-from exneat_cli.tasks.gym import GymTask
-from exneat_cli.tasks.robots.ant import AntTask
-from exneat_cli.tasks.robots.robot import RobotTask
-from exneat_cli.tasks.task import (
-    ENDED,
-    FAILED,
-    RUNNING,
-    Adapter,
-    Camera,
+from exneat_cli.tasks.capabilities import (
     HasAdapter,
     HasBatch,
     HasDistance,
@@ -24,11 +13,14 @@ from exneat_cli.tasks.task import (
     HasInitialPose,
     HasPicture,
     HasTiles,
-    Part,
-    Simulation,
-    Task,
-    setting,
 )
+from exneat_cli.tasks.grid.mazes import GeneralMaze, TrackMaze
+from exneat_cli.tasks.grid.predator_prey import Foraging, Hunting
+from exneat_cli.tasks.grid.world import GridTask
+from exneat_cli.tasks.gym import GymTask
+from exneat_cli.tasks.robots.ant import AntTask
+from exneat_cli.tasks.robots.robot import RobotTask
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Adapter, Camera, Part, Simulation, Task, setting
 
 TASKS: dict[str, type[Task]] = {
     "ant": AntTask,

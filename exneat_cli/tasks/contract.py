@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from exneat_cli.errors import ConfigError, ExneatError, check_flag, check_real, check_text, check_whole
 from exneat_cli.interruption import uninterrupted
-from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, HasFullReward, HasInitialPose, Part, Simulation, Task
+from exneat_cli.tasks.capabilities import HasFullReward, HasInitialPose
+from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task
 
 TRIAL_SECONDS = 2.0
 """An episode that is tried is given up after this long; those of simulators can take minutes."""

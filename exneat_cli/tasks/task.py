@@ -1,4 +1,4 @@
-"""What every task offers to the other rooms, and what only some tasks have."""
+"""What every task offers to the other rooms."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from exneat_cli.errors import ExneatError
 
 RUNNING = 0
 """The episode goes on."""
@@ -108,6 +106,13 @@ class Adapter(NamedTuple):
     middle: NDArray[np.float64]
     span: NDArray[np.float64]
     bounded: bool
+
+
+class Camera(Protocol):
+    """Draws what a world was; belongs to one process."""
+
+    def draw(self, snapshot: Any) -> NDArray[np.uint8]:
+        """(height, width, 3) the picture of a `HasPicture.snapshot`; one of another size is made to fit."""
 
 
 class Task(ABC):
@@ -220,92 +225,13 @@ class Task(ABC):
         return None
 
     def drawable(self) -> Task:
-        """The task with worlds that can be drawn, see `HasPicture`.
+        """The task in the form whose worlds can be drawn, see `HasPicture`; itself unless that is another one.
 
         Raises:
             ExneatError: they cannot.
         """
-        if not isinstance(self, HasPicture):
-            fix = "a class of yours is watched once it has the methods snapshot() and camera(), see HasPicture"
-            raise ExneatError(f"task={self.name}: expected a task whose worlds can be drawn\n  {fix}")
         return self
 
     def fitness_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
         """(...) fitness of episodes whose terms add up to `totals`, (..., terms)."""
         return np.asarray(np.sum(totals, axis=-1))
-
-
-@runtime_checkable
-class HasTiles(Protocol):
-    """A task whose world can be drawn as tiles."""
-
-    def tiles(self, world: Any) -> NDArray[np.float64]:
-        """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
-
-
-@runtime_checkable
-class HasInitialPose(Protocol):
-    """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
-
-    def usual_reset_scale(self) -> float:
-        """The size of this noise unless told otherwise."""
-
-    def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
-        """Open a new world, with noise of this size on the initial pose."""
-
-
-@runtime_checkable
-class HasFullReward(Protocol):
-    """A task with a second figure besides the fitness."""
-
-    def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(...) the second figure that tests report."""
-
-
-@runtime_checkable
-class HasDistance(Protocol):
-    """A task whose fitness says how far an episode led."""
-
-    def metres_of(self, fitness: float) -> float:
-        """Distance travelled forward (m)."""
-
-    def seconds_of(self, steps: float) -> float:
-        """What so many control steps take (s)."""
-
-
-@runtime_checkable
-class HasAdapter(Protocol):
-    """A task whose champions can be taken to other programs although it turns readings or actions."""
-
-    def adapter(self) -> Adapter:
-        """How readings become what brains sense, and what brains put out becomes controls."""
-
-
-class Camera(Protocol):
-    """Draws what a world was; belongs to one process."""
-
-    def draw(self, snapshot: Any) -> NDArray[np.uint8]:
-        """(height, width, 3) the picture of a `HasPicture.snapshot`; one of another size is made to fit."""
-
-
-@runtime_checkable
-class HasPicture(Protocol):
-    """A task whose world can be filmed."""
-
-    def snapshot(self, world: Any) -> Any:
-        """What a picture of the world as it is now needs, as data that other processes can read."""
-
-    def camera(self, width: int, height: int) -> Camera:
-        """Something that makes pictures of snapshots, of so many pixels."""
-
-
-@runtime_checkable
-class HasBatch(Protocol):
-    """A task of which many worlds run side by side on a GPU."""
-
-    def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
-        """Open `count` worlds on a device, with `room` times the usual room for contacts.
-
-        Raises:
-            ConfigError: they cannot run there.
-        """

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.errors import ConfigError
 from exneat_cli.seeding import EpisodeSeeds, generator
-from exneat_cli.tasks.robots.batch import kernels, ordering
+from exneat_cli.tasks.robots.batch import judging, kernels, ordering
 from exneat_cli.tasks.robots.dynamics import RobotWorld, rewind
 from exneat_cli.tasks.task import Simulation
 
@@ -111,9 +111,9 @@ class RobotWorlds:
         self._joints = _uploaded(f.scalar_from), _uploaded(f.scalar_to), _uploaded(f.scalar_sign)
         signs = f.action_signs if self.is_framed else np.ones(model.nu)
         self._drive = _uploaded(signs), _uploaded(world.middle), _uploaded(world.span)
-        names = [name for name in world._fields if name in kernels.Rules.vars]  # type: ignore[attr-defined]
+        names = [name for name in world._fields if name in judging.Rules.vars]  # type: ignore[attr-defined]
         rules = {name: getattr(world, name) for name in names}
-        self._rules = _filled(kernels.Rules(), **rules, total_mass=float(world.masses.sum()))
+        self._rules = _filled(judging.Rules(), **rules, total_mass=float(world.masses.sum()))
 
     def starts(self, episodes: Sequence[EpisodeSeeds]) -> NDArray[np.float32]:
         """(E, `start_size`) the starts of episodes, drawn as worlds on the CPU draw them."""
@@ -172,7 +172,7 @@ class RobotWorlds:
             self._add_contact_forces()
         state = [data.qpos, data.qvel, data.qacc, data.xpos, data.xipos, data.ctrl, self.force]
         own = [self._place, self._mark, self._clock, self.status, self.terms]
-        wp.launch(kernels.judge, dim=self.count, inputs=[self._rules, *state, *own])
+        wp.launch(judging.judge, dim=self.count, inputs=[self._rules, *state, *own])
 
     def _add_contact_forces(self) -> None:
         data, model = self.data, self.model
