@@ -71,9 +71,11 @@ def run(line: CommandLine) -> int:
         study = _study(folder, first, space)
         _search(study, space, line, path.stem, asked["trials"])
     best = study.best_trial
-    print(
-        f"\nbest of {len(_complete(study))}: validation {best.value:.6g}, trial {best.number}, {best.user_attrs['run']}"
-    )
+    done = _complete(study)
+    equals = sum(trial.value == best.value for trial in done)
+    alone = f", the first of {equals} that reached it" if equals > 1 else ""
+    where = f"trial {best.number}{alone}, {best.user_attrs['run']}"
+    print(f"\nbest of {len(done)}: validation {best.value:.6g}, {where}")
     print("the same training elsewhere:")
     others = [word for word in line.words[2:] if word.partition("=")[0] not in (*_OWN, "name")]
     settings = [f"{key}={_typed(value)}" for key, value in (space.settings | best.params).items()]
