@@ -198,7 +198,7 @@ class Recording(NamedTuple):
 
     Attributes:
         snapshots: what the world was when the brain sensed it, see `exneat_cli.tasks.HasPicture`, at step 0 and at
-            every so many steps from there.
+            every so many steps from there; where steps have no duration also after the last one.
         values: (T, memory) the brain's value vector after each step.
         trace: (T + 1, columns) as of `exneat_cli.rollouts.Trace`.
     """
@@ -237,6 +237,8 @@ def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, s
     trace = np.zeros((task.longest_episode + 1, located + len(task.terms)))
     with uninterrupted():
         loop(simulation.world, brain, 0, 1, *map(generator, seeds), disturbance, buffers, halt, tally, trace, located)
+    if task.step_seconds is None:  # the last step is what ends such an episode: a goal reached, the last prey caught
+        snapshots.append(task.snapshot(simulation.world))
     return Recording(snapshots, np.array(values), trace[: len(values) + 1].copy())
 
 

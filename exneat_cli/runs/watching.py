@@ -87,6 +87,8 @@ def record_champion(
         ]
         values[1:, linked] = values[:-1, linked].copy()
         values[0, linked] = 0.0
+    if len(recording.snapshots) > len(values[::every]):  # what the last step led to, at which no network looks
+        values = np.concatenate([values, values[-1:]])
     # So far: nodes of relu that feed themselves may grow without bounds, and would seem to begin with nothing.
     largest = np.maximum.accumulate(np.abs(values), axis=0)
     captions = _captions(task, recording.trace, range(0, len(values), every))

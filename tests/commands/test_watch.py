@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -22,7 +23,9 @@ from exneat_cli.analysis.film import fitted
 from exneat_cli.commands import drawing, watch
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
+from exneat_cli.records import RunDirectory
 from exneat_cli.records.video import VIDEO_FORMATS
+from exneat_cli.runs import record_champion
 from tests.commands.refusals import check_refusal
 
 FFMPEG = "pip install 'exneat[video]'"
@@ -63,13 +66,19 @@ def decoded(path: Path) -> list[np.ndarray]:
         return found
 
 
+def brown(picture: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Rows and columns of the pixels that are the Ant's."""
+    red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
+    return np.nonzero((red > green + 20) & (green > blue))
+
+
 @pytest.mark.parametrize("form", ["mp4", "gif", "webp"])
 def test_a_grid_world_plays_in_every_format(form: str, runs: Path) -> None:
     pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
     run = run_of(runs, "foraging/exneat-*-s0-*")
     assert main(["watch", f"run={run}", f"format={form}", "workers=1", "width=320", "height=240"]) == 0
     frames = decoded(run / "plots" / f"champion.{form}")
-    assert len(frames) == 9
+    assert len(frames) == 10, "what was before each of 9 steps, and what the last one led to"
     assert frames[0].shape == (240, 640, 3)
     middle = frames[4].astype(int)
     assert (np.abs(middle[:, :320] - (0, 153, 51)).max(axis=-1) < 60).sum() > 100, "no agent"
@@ -99,13 +108,15 @@ def test_a_robot_is_in_view_and_its_nodes_light_up(runs: Path) -> None:
     frames = decoded(run / "plots" / "champion.mp4")
     assert len(frames) == 6, "every second step of 12"
     assert frames[0].shape == (480, 1280, 3)
-    body = frames[3][24:-24, :640].astype(int)
-    brown = (body[..., 0] > body[..., 1] + 20) & (body[..., 1] > body[..., 2])
-    rows, columns = np.nonzero(brown)
-    assert brown.sum() > 2000
+    rows, columns = brown(frames[3][24:-24, :640])
+    assert len(rows) > 2000
     assert abs(rows.mean() - 216) < 100, "the body is not in the middle"
     assert abs(columns.mean() - 320) < 150
     assert (frames[1][:, 640:] != frames[4][:, 640:]).any()
+    scene = record_champion(RunDirectory(run), episode=0, seed=None, sweep=None, steps=1, fps=None)
+    pose = scene.snapshots[0] + 3.0 * (np.arange(len(scene.snapshots[0])) == 2)
+    (high,) = drawing.drawn([replace(scene, snapshots=[pose])], (640, 480), False, 1)
+    assert len(brown(high[24:-24])[0]) > 2000, "the camera stays below a body that jumps"
 
 
 def test_training_films_its_champion_once_if_asked_to_and_does_without_where_it_cannot(
@@ -167,11 +178,11 @@ def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: P
             assert address.startswith("http://127.0.0.1:")
             with urlopen(address) as page:
                 text = page.read().decode()
-            assert "last = 8" in text
+            assert "last = 9" in text
             assert not re.findall(r"(?:src|href)=.?(?:https?:)?//", text), "it would ask the network"
-            with urlopen(f"{address}/frames/8.jpg") as frame, Image.open(frame) as picture:
+            with urlopen(f"{address}/frames/9.jpg") as frame, Image.open(frame) as picture:
                 assert picture.size == (320, 120)
-            for absent in ("frames/9.jpg", "frames/-1.jpg", "frames/../../etc/passwd"):
+            for absent in ("frames/10.jpg", "frames/-1.jpg", "frames/../../etc/passwd"):
                 with pytest.raises(HTTPError, match="404"):
                     urlopen(f"{address}/{absent}")
             port = address.rpartition(":")[2]

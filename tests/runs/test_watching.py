@@ -41,7 +41,9 @@ def test_a_recorded_episode_is_that_of_a_runner_and_every_value_follows_from_tho
         expected, _ = runner.trace(champion.brain(), seeds)
     recording = record(settings.task, settings.noise, champion.brain(), seeds, 1000)  # type: ignore[arg-type]
     np.testing.assert_array_equal(recording.trace, expected)
-    assert len(recording.snapshots) == len(recording.values) == len(expected) - 1
+    assert len(recording.values) == len(expected) - 1
+    steps_have_duration = settings.task.step_seconds is not None
+    assert len(recording.snapshots) == len(expected) - steps_have_duration, "what a step that ends it led to is seen"
     genomes = [genome.in_arrays() for genome in champion.genomes]
     places = places_in_memory(champion.plan, genomes, feed_forward=champion.feed_forward)
     now = recording.values
@@ -77,7 +79,8 @@ def test_a_film_says_time_distance_and_what_was_caught_and_ends_when_told(tmp_pa
     assert walk.captions[2].startswith("time   0.2 s")
     assert re.match(r"step 0, \d of 10 caught", hunt.captions[0])
     assert len(walk.snapshots) == len(walk.captions) == len(walk.shares) == 3, "every second one, in real time"
-    assert len(hunt.snapshots) == len(hunt.captions) == len(hunt.shares) == 5
+    assert len(hunt.snapshots) == len(hunt.captions) == len(hunt.shares) == 6, "and what the last step led to"
+    assert hunt.captions[-1].startswith("step 5,")
     assert (walk.fps, hunt.fps) == (10.0, 4.0)
     assert np.abs(walk.shares).max() == 1.0
     other = record_champion(directories[1], episode=0, seed=9, sweep=None, steps=5, fps=None)

@@ -29,13 +29,13 @@ class RobotCamera:
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._model, self._data, self._trunk = model, mujoco.MjData(model), trunk
         mujoco.mj_forward(model, self._data)
-        moving = model.geom_bodyid >= trunk
+        self._moving = model.geom_bodyid >= trunk
         away = np.linalg.norm(self._data.geom_xpos - self._data.xpos[trunk], axis=1) + model.geom_rbound
+        self._height, self._reach = float(self._data.xpos[trunk, 2]), float(away[self._moving].max())
         is_free = bool((model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).any())
         self._camera = mujoco.MjvCamera()
-        self._camera.distance = DISTANCE * float(away[moving].max())
+        self._camera.distance = DISTANCE * self._reach
         self._camera.azimuth, self._camera.elevation = BODY if is_free else PLANAR
-        self._height = float(self._data.xpos[trunk, 2])
         self._renderer = mujoco.Renderer(model, height, width)
         atexit.register(self._renderer.close)  # OSMesa complains of one that is closed after Python's own shutdown
 
@@ -43,7 +43,9 @@ class RobotCamera:
         """(height, width, 3) of positions, (nq,)."""
         self._data.qpos[:] = snapshot
         mujoco.mj_forward(self._model, self._data)
-        # Height stays, so that a hopping body is seen to hop.
-        self._camera.lookat[:] = (*self._data.xpos[self._trunk, :2], 0.8 * self._height)
+        top = float((self._data.geom_xpos[:, 2] + self._model.geom_rbound)[self._moving].max())
+        # Height stays, so that a hopping body is seen to hop, unless it would leave the picture.
+        height = max(0.8 * self._height, top - self._reach)
+        self._camera.lookat[:] = (*self._data.xpos[self._trunk, :2], height)
         self._renderer.update_scene(self._data, self._camera)
         return np.asarray(self._renderer.render())
