@@ -13,7 +13,7 @@ _ESCAPED = {
     "<": r"\textless{}",
     ">": r"\textgreater{}",
     "|": r"\textbar{}",
-    '"': r"\textquotedbl{}",
+    '"': r"\symbol{34}",  # \textquotedbl is unknown to LaTeX's usual font encoding, OT1
 }
 _NUMBER = re.compile(r"[<>+-]?\d[\d.]*")
 
