@@ -23,6 +23,7 @@ from exneat_cli.errors import ExneatError, check_choice
 
 Tables = dict[str, pd.DataFrame]
 """Variant -> what its runs reached: a row per place on the horizontal axis, a column per seed."""
+Looks = Mapping[str, Look]
 _AXIS_LABELS = {
     "generation": "generation",
     "episodes": "training episodes",
@@ -69,7 +70,8 @@ def draw_figure(
     else:
         figure, sentences = _draw_panels(plan, studies, axis, paper)
     paths = save_figure(figure, directory / plan.name, paper, ("png", "svg", "pdf"))
-    return Built(plan.name, plan.title, " ".join(filter(None, [f"{plan.title}.", *sentences])), tuple(paths))
+    text = " ".join(filter(None, [f"{plan.title}.", *sentences]))
+    return Built(plan.name, plan.title, text, tuple(paths))
 
 
 def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -> None:
@@ -110,7 +112,8 @@ def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str, pape
         places = figure.subplots(rows, beside, squeeze=False).ravel()
         for axes, panel in zip(places, plan.panels, strict=False):
             study = studies[panel.experiment]
-            counts.append(draw_panel(plan.kind, axes, panel, study, axis))
+            looks = variant_styles(study.variants, study.baselines, paper.sheet.get("axes.prop_cycle", ()))
+            counts.append(draw_panel(plan.kind, axes, panel, study, looks, axis))
             axes.set_title(study.conditions[panel.condition])
         for axes in places[len(plan.panels) :]:
             axes.remove()
@@ -175,29 +178,29 @@ def _sentences(
     yield budget_sentence(spent)
 
 
-def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, axis: str) -> dict[str, int]:
+def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, looks: Looks, axis: str) -> dict[str, int]:
     """Draw one panel of a figure on empty axes; returns the number of runs of each variant that it shows.
 
     Kinds are ``training`` (means of runs with 95% bands), ``training_runs`` (each run thin, means thick), ``area`` (one
     point per run, its mean over generations), ``robustness`` (means of runs with 95% bands; where a variant has more
     than `BEST` runs, dashed the mean of those best on validation) and ``cluster`` (one point per run at each level).
-    Training curves run over `axis`, one of `AXES`.
+    Training curves run over `axis`, one of `AXES`. `looks` are those of all variants.
 
     Raises:
         MissingRunsError: a variant has no finished run, or none has a finished sweep.
     """
     if kind in ("robustness", "cluster"):
         tables = _swept(panel, study)
-        (_draw_levels if kind == "robustness" else _draw_clusters)(axes, panel, study, tables)
+        (_draw_levels if kind == "robustness" else _draw_clusters)(axes, panel, study, tables, looks)
         score = "full reward" if panel.value == "full_reward" else study.fitness_name
         axes.set(xlabel=study.sweeps[str(panel.sweep)], ylabel=score)
     else:
         study.require(panel.condition, study.trained_variants)
         tables = _tables(study.history(panel.condition), study.trained_variants, axis, "best_so_far")
         if kind == "area":
-            _draw_areas(axes, study, tables)
+            _draw_areas(axes, study, tables, looks)
         else:
-            _draw_curves(axes, study, tables, axis, each_run=kind == "training_runs")
+            _draw_curves(axes, study, tables, looks, axis, each_run=kind == "training_runs")
     return {variant: table.shape[1] for variant, table in tables.items()}
 
 
@@ -218,8 +221,9 @@ def common_curves(curves: pd.DataFrame) -> pd.DataFrame:
     return common.iloc[np.unique(np.linspace(0, len(common) - 1, MOST_POINTS).round().astype(int))]
 
 
-def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_run: bool) -> None:
-    for variant, look in variant_styles(study.trained_variants).items():
+def _draw_curves(axes: Axes, study: Study, tables: Tables, looks: Looks, axis: str, *, each_run: bool) -> None:
+    for variant in study.trained_variants:
+        look = looks[variant]
         curves = common_curves(tables[variant])
         if each_run:
             for seed in tables[variant]:
@@ -236,10 +240,10 @@ def _draw_curves(axes: Axes, study: Study, tables: Tables, axis: str, *, each_ru
         axes.xaxis.set_major_formatter(EngFormatter(sep=""))
 
 
-def _draw_areas(axes: Axes, study: Study, tables: Tables) -> None:
-    for place, (variant, look) in enumerate(variant_styles(study.trained_variants).items()):
+def _draw_areas(axes: Axes, study: Study, tables: Tables, looks: Looks) -> None:
+    for place, variant in enumerate(study.trained_variants):
         areas = tables[variant].mean().to_frame().T
-        _draw_points(axes, np.array([place]), areas, look, _kept(study.variants[variant]), room=0.7, size=40)
+        _draw_points(axes, np.array([place]), areas, looks[variant], _kept(study.variants[variant]), room=0.7, size=40)
     axes.plot([], [], label="bar: mean over runs", **_BAR)
     axes.set(xticks=[], xlabel="variant", ylabel=f"best {study.fitness_name} so far,\nmean over generations")
     axes.margins(x=0.08)
@@ -257,16 +261,15 @@ def _swept(panel: Panel, study: Study) -> Tables:
     return tables
 
 
-def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
-    styles = variant_styles(study.variants, study.baselines)
+def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables, looks: Looks) -> None:
     for variant, table in tables.items():
-        axes.plot(table.index, table.mean(axis=1), label=_kept(study.variants[variant]), **styles[variant])
+        axes.plot(table.index, table.mean(axis=1), label=_kept(study.variants[variant]), **looks[variant])
         if variant in study.baselines:
             continue
-        _draw_band(axes, table, styles[variant])
+        _draw_band(axes, table, looks[variant])
         if table.shape[1] > BEST:
             best = table[study.best_seeds(panel.condition, variant, table.columns)]
-            axes.plot(table.index, best.mean(axis=1), color=styles[variant]["color"], zorder=2, **_DASHED)
+            axes.plot(table.index, best.mean(axis=1), color=looks[variant]["color"], zorder=2, **_DASHED)
     if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
     trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
@@ -275,14 +278,13 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None
     tick_levels(axes, (level for table in tables.values() for level in table.index))
 
 
-def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables) -> None:
+def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables, looks: Looks) -> None:
     """Variants stand side by side at each level."""
     levels = sorted({level for table in tables.values() for level in table.index})
     trained = [variant for variant in tables if variant not in study.baselines]
-    styles = variant_styles(study.variants, study.baselines)
     room = 0.8 / len(trained)
     for variant, table in tables.items():
-        look, label = styles[variant], _kept(study.variants[variant])
+        look, label = looks[variant], _kept(study.variants[variant])
         places = np.array([levels.index(level) for level in table.index], dtype=np.float64)
         if variant in study.baselines:
             line = {"color": look["color"], "linestyle": look["linestyle"]}

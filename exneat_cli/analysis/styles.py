@@ -6,6 +6,7 @@ Variants have colours that colour-blind readers can tell apart, and shapes and d
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -91,13 +92,19 @@ _BASELINES = {
 _MORE_BASELINES = [_look("#7a7a7a", "", line) for line in (":", "-.", DASH_DOT_DOT)]
 
 
-def variant_styles(variants: Collection[str], baselines: Collection[str] = ()) -> dict[str, Look]:
+def variant_styles(
+    variants: Collection[str], baselines: Collection[str] = (), cycle: Iterable[Look] = ()
+) -> dict[str, Look]:
     """Choose the look of each of an experiment's `variants`; `baselines` among them are grey lines without markers.
 
     Variants of the thesis have a look of their own. Others take, in their order, the first colour that no
-    variant of the same experiment has yet, and start over when all are taken.
+    variant of the same experiment has yet, and start over when all are taken. Colours, markers and dashes of a `cycle`
+    (matplotlib's ``axes.prop_cycle``) are taken in the order of trained variants, and count more.
     """
-    trained = _chosen([name for name in variants if name not in baselines], _TRAINED, _MORE_TRAINED)
+    learning = [name for name in variants if name not in baselines]
+    trained = _chosen(learning, _TRAINED, _MORE_TRAINED)
+    for name, own in zip(learning, itertools.cycle(cycle), strict=False):
+        trained[name] = trained[name] | {key: own[key] for key in ("color", "marker", "linestyle") if key in own}
     return trained | _chosen([name for name in variants if name in baselines], _BASELINES, _MORE_BASELINES)
 
 

@@ -18,7 +18,7 @@ from msgspec.structs import replace as changed
 from exneat_cli.analysis.catalogue import FIGURE_KINDS, FigurePlan, Panel
 from exneat_cli.analysis.report_figures import common_curves, draw_figure, draw_panel
 from exneat_cli.analysis.study import MissingRunsError, Study
-from exneat_cli.analysis.styles import Paper, read_style_sheet
+from exneat_cli.analysis.styles import Paper, read_style_sheet, variant_styles
 from exneat_cli.errors import ExneatError
 from tests.analysis.fake_studies import (
     LEVELS,
@@ -144,7 +144,7 @@ def test_a_figure_with_variants_of_its_own_shows_and_needs_no_others(tmp_path: P
 
 def drawn(study: Study, kind: str, panel: Panel = SWEPT, axis: str = "generation") -> tuple[Axes, dict[str, int]]:
     axes = Figure().add_subplot()
-    return axes, draw_panel(kind, axes, panel, study, axis)
+    return axes, draw_panel(kind, axes, panel, study, variant_styles(study.variants, study.baselines), axis)
 
 
 def test_a_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path) -> None:
@@ -286,7 +286,10 @@ def test_a_figure_for_paper_is_as_wide_as_its_columns_has_no_title_and_nothing_i
 
 def test_what_a_style_sheet_says_counts_more(tmp_path: Path) -> None:
     sheet = tmp_path / "mine.mplstyle"
-    sheet.write_text("font.size: 13  # large\naxes.titlesize: medium\n\n# a comment\naxes.grid: False\n")
+    cycle = "axes.prop_cycle: cycler('color', ['123456', '234567'])"
+    sheet.write_text(f"font.size: 13  # large\naxes.titlesize: medium\n\n# a comment\naxes.grid: False\n{cycle}\n")
     paper = Paper(2, read_style_sheet(sheet))
     drawing = draw_figure(a_plan("training"), {"track": a_study(tmp_path)}, tmp_path / "report", paper=paper).paths[1]
     assert "font-size: 13px" in drawing.read_text()
+    assert "stroke: #123456" in drawing.read_text()
+    assert "stroke: #234567" in drawing.read_text()
