@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
+from exneat_cli.analysis.curve_values import Strip
 from exneat_cli.errors import ExneatError, check_choice, check_section
 from exneat_cli.records import converted, read_yaml
 
@@ -112,6 +113,7 @@ class Built(NamedTuple):
         name, title, caption: what it is called, what it shows in a few words, and the sentences below it.
         paths: its files.
         header, rows: the cells of a table, as printed; empty for a figure.
+        strips: where on the picture of a figure which values are.
     """
 
     name: str
@@ -120,6 +122,7 @@ class Built(NamedTuple):
     paths: tuple[Path, ...]
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
+    strips: tuple[Strip, ...] = ()
 
 
 def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:

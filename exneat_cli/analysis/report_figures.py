@@ -15,6 +15,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel
+from exneat_cli.analysis.curve_values import value_strips
 from exneat_cli.analysis.network_graph import champion_of, champions_figure
 from exneat_cli.analysis.statistics import bootstrap_interval
 from exneat_cli.analysis.study import BEST, MissingRunsError, Study, budget_sentence, few_runs_sentence
@@ -71,7 +72,9 @@ def draw_figure(
         figure, sentences = _draw_panels(plan, studies, axis, paper)
     paths = save_figure(figure, directory / plan.name, paper, ("png", "svg", "pdf"))
     text = " ".join(filter(None, [f"{plan.title}.", *sentences]))
-    return Built(plan.name, plan.title, text, tuple(paths))
+    # Where a style sheet cuts the margins off, places on the picture are no longer known.
+    strips = () if paper.sheet.get("savefig.bbox") else value_strips(figure, _KEPT)
+    return Built(plan.name, plan.title, text, tuple(paths), strips=strips)
 
 
 def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.analysis.catalogue import Built
+from exneat_cli.analysis.curve_values import Strip
 from exneat_cli.analysis.index_page import write_index
 from exneat_cli.analysis.tables import build_comparison
 from exneat_cli.errors import ExneatError
@@ -90,8 +91,14 @@ def test_text_from_files_is_never_taken_for_markup(tmp_path: Path) -> None:
     study = a_study(tmp_path / "runs", variants={"neat": evil, "exneat": "E"}, baselines=(), conditions={"calm": evil})
     report = tmp_path / "report"
     table = Built("others", evil, evil, (), (evil,), ((evil,),))
-    artefacts = [a_figure(report, "figure-4.1", evil), build_comparison(study, report), table]
-    page = Page(write_index(report, {"track": study}, artefacts, {evil: f"{evil}\n{evil}"}))
+    figure = a_figure(report, "figure-4.1", evil)._replace(strips=(Strip(10.0, 20.0, 2.504, 60.0, f"{evil}\n0.5"),))
+    page = Page(
+        write_index(
+            report, {"track": study}, [figure, build_comparison(study, report), table], {evil: f"{evil}\n{evil}"}
+        )
+    )
+    assert page.values["title"] == [f"{evil}\n0.5"]
+    assert page.values["style"] == ["left:10.00%;top:20.00%;width:2.50%;height:60.00%"]
     assert page.tags.count("script") == 1  # ours
     assert page.words.count(evil) >= 12
 

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib.image
 import msgspec
 import numpy as np
 import pandas as pd
@@ -293,3 +294,31 @@ def test_what_a_style_sheet_says_counts_more(tmp_path: Path) -> None:
     assert "font-size: 13px" in drawing.read_text()
     assert "stroke: #123456" in drawing.read_text()
     assert "stroke: #234567" in drawing.read_text()
+
+
+def test_values_of_curves_are_shown_where_they_are_on_the_picture(tmp_path: Path) -> None:
+    study = a_study(tmp_path, conditions={"calm": "calm"})
+    plan = FigurePlan("mine", "robustness", "Made up", (SWEPT, SWEPT))
+    built = draw_figure(plan, {"track": study}, tmp_path / "report")
+    one, other = built.strips[: len(LEVELS)], built.strips[len(LEVELS) :]
+    assert [strip.text for strip in one] == [strip.text for strip in other]
+    means = (
+        study.robustness("calm").query("parameter == @SWEPT.sweep").groupby(["level", "variant"])["fitness_mean"].mean()
+    )
+    for level, strip in zip(LEVELS, one, strict=True):
+        values = [f"{label}: {means[level, name]:.4g}" for name, label in study.variants.items()]
+        assert strip.text.splitlines() == [f"{study.sweeps[str(SWEPT.sweep)]} {level:g}", *values]
+    picture = matplotlib.image.imread(built.paths[0])[..., :3].mean(axis=2)
+    height, width = picture.shape
+    for first, last in ((one[0], one[-1]), (other[0], other[-1])):  # from the axis on the left, down to that below
+        column, row = round(first.left / 100 * width), round((first.top + first.height) / 100 * height)
+        assert picture[row // 2 : row - 8, column - 2 : column + 3].min(axis=1).max() < 0.3
+        assert (
+            picture[row - 2 : row + 3, column + 8 : round((last.left + last.width) / 100 * width)].min(axis=0).max()
+            < 0.3
+        )
+
+
+def test_curves_have_no_values_where_a_style_sheet_cuts_the_margins_off(tmp_path: Path) -> None:
+    paper = Paper(sheet={"savefig.bbox": "tight"})
+    assert not draw_figure(a_plan("training"), {"track": a_study(tmp_path)}, tmp_path / "report", paper=paper).strips
