@@ -57,6 +57,9 @@ def test_a_search_that_was_killed_ends_as_one_that_was_not_and_its_command_repea
     assert main([*train[1:], f"output={tmp_path / 'again'}"]) == 0
     (run,) = find_runs(tmp_path / "again")
     assert f"validation {run.read_result().validation:.6g}," in best
+    reached = [line.partition(":")[0].split()[-1] for line in whole.splitlines() if line.startswith("[")]
+    equals = reached.count(f"{run.read_result().validation:.4g}")
+    assert (f", the first of {equals} that reached it," in best) == (equals > 1)
     capsys.readouterr()
     assert main([*search, f"output={tmp_path / 'cut'}"]) == 0
     assert best_of(capsys.readouterr().out)[0] == best
