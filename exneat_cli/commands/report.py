@@ -50,20 +50,16 @@ def run(line: CommandLine) -> int:
         name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
     }
     commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
-    lacking = ExneatError(
-        f"output={asked['output']}: no finished run of {', '.join(names)}\n  "
-        + (_own_experiments(asked, sources) or commands[names[0]])
-    )
     if not any(_has_any(experiments[name], budgets[name], asked["output"], rows[name]) for name in names):
         first = experiments[names[0]]  # planning all of them takes ten seconds
         one = replace(
             first, conditions=dict([*first.conditions.items()][:1]), variants=dict([*first.variants.items()][:1])
         )
         plan_jobs(one, budgets[names[0]], line, _OWN)  # refuses settings that make no sense
-        raise lacking
+        raise _nothing_to_report(asked, sources, commands)
     studies = {name: study_of(experiments[name], budgets[name], commands[name], line, rows[name]) for name in names}
     if not any(study.reached for study in studies.values()):
-        raise lacking
+        raise _nothing_to_report(asked, sources, commands)
     directory = Path(asked["output"]) / "report" / (own.name if own else "")
     built: list[Built] = []
     missing: dict[str, str] = {}
@@ -177,18 +173,28 @@ def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
     return {sweep: min(found) for sweep, found in levels.items() if len(found) == 1}
 
 
-def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> str:
-    """The commands that report on what other experiments the runs are of; empty if there are none."""
+def _nothing_to_report(
+    asked: Mapping[str, Any], sources: Mapping[str, Any], commands: Mapping[str, str]
+) -> ExneatError:
+    """Say what there is instead, of other experiments or of none, and the commands for it."""
     found: dict[str, None] = {}
+    alone = 0
     for run in find_runs(Path(asked["output"])):
         try:
             words = run.read_manifest().command
         except ExneatError:
             continue
-        found |= dict.fromkeys(word for word in words if word.startswith("experiment="))
+        of = [word for word in words if word.startswith("experiment=")]
+        found |= dict.fromkeys(of)
+        alone += not of
+    nothing = f"output={asked['output']}: no finished run of {', '.join(commands)}\n"
     others = [word for word in found if word.partition("=")[2] not in map(str, sources.values())]
-    reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
-    return f"there are runs of another experiment: {reports}" if reports else ""
+    if others:
+        reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
+        return ExneatError(f"{nothing}  there are runs of another experiment: {reports}")
+    listing = shlex.join(["exneat", "inspect", *_place(asked)])
+    compared = f"  there are runs of no experiment, which {listing} compares; those of one come from\n"
+    return ExneatError(f"{nothing}{compared if alone else ''}  {next(iter(commands.values()))}")
 
 
 def _largest_budget(experiment: Experiment, output: str, rows: Sequence[PublishedRun]) -> str:
