@@ -16,11 +16,12 @@ from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.inspect import tell_unreadable
 from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
-from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
+from exneat_cli.records import PublishedRun, find_runs, read_published, runs_at
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis", "columns", "style")
@@ -179,7 +180,7 @@ def _nothing_to_report(
     """Say what there is instead, of other experiments or of none, and the commands for it."""
     found: dict[str, None] = {}
     alone = 0
-    for run in find_runs(Path(asked["output"])):
+    for run in find_runs(Path(asked["output"]), tell_unreadable):
         try:
             words = run.read_manifest().command
         except ExneatError:
@@ -210,5 +211,4 @@ def _has_any(experiment: Experiment, budget: str, output: str, rows: Sequence[Pu
     if any(row.budget == budget for row in rows):
         return True
     folders = [Path(output) / f"{experiment.name}-{condition}-{budget}" for condition in experiment.conditions]
-    manifests = (path for folder in folders for path in folder.glob("*/manifest.json"))
-    return any(RunDirectory(path.parent).is_finished() for path in manifests)
+    return any(run.is_finished() for folder in folders for run in runs_at(folder / "*"))

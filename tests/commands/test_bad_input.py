@@ -52,7 +52,7 @@ TRAIN = {
     "judging=first": "judging: expected one of last, mean",
     "champion=lucky": "champion: expected one of race, thesis",
     "recipe=running": "recipe=running: no such option; known: thesis, walking",
-    "task=hunting recipe=thesis": "recipe: expected nothing, since the task that was chosen has no recipe to choose",
+    "task=hunting recipe=thesis": "recipe: expected nothing, since this command, or the task that was chosen,",
     "linkage=hidden": "recipe=thesis has hidden nodes",
     "linkage=feedback": "recipe=thesis has hidden nodes and a central module",
     "wiring.central=true": "recipe=thesis has hidden nodes and a central module",
