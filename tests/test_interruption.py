@@ -27,7 +27,10 @@ def in_process(code: str, *arguments: str | Path) -> subprocess.CompletedProcess
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, start_new_session=True)
 
 
-@pytest.mark.parametrize("number", SIGNALS)
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGXCPU")
+
+
+@pytest.mark.parametrize("number", [signal.Signals[name] for name in NAMES])
 def test_a_signal_raises_keyboard_interrupt_once_and_is_known_afterwards(number: int) -> None:
     before = signal.getsignal(number)
     with listening():

@@ -31,9 +31,7 @@ MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles
 FAINT = 0.13
 """Opacity of what has no part in what the agent does."""
 _GREY, _INNER = styles.GREY, "#999999"
-_POINTS = 72.0  # per inch
 _LEAST_ROOM = 5.4  # points from one input to the next that names need
-_LARGEST_TEXT, _SMALLEST_TEXT, _WIDTH_OF_LETTERS = 7.0, 3.5, 0.64  # sizes in points, and width as a share of them
 _BOW = 0.15  # how far links swing aside, as a share of their length; there and back swing to different sides
 _ALIKE = 0.98  # share of the weights whose widths differ: beside a single outlier all others would vanish
 _MANY_LINKS, _MANY_EDGES = 40, 200
@@ -224,18 +222,14 @@ def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: se
 
 def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
     """Write above each output the actuator that it drives, if any."""
-    module = champion.plan.modules[m]
-    if not module.drives:
-        return
-    # The unit has a line of its own.
-    names = [champion.actuators[actuator].replace("_", " ").replace(" (", "\n(") for actuator in module.drives]
-    across = [places[m, output][0] for output in range(len(names))]
-    room = _POINTS * min((right - left for left, right in pairwise(across)), default=1.0)
-    widest = 1 + max(len(line) for name in names for line in name.split("\n"))
-    size = float(np.clip(room / (_WIDTH_OF_LETTERS * widest), _SMALLEST_TEXT, _LARGEST_TEXT))
-    for output, name in enumerate(names):
+    outputs = range(len(champion.plan.modules[m].drives))
+    across = [places[m, output][0] for output in outputs]
+    room = min((right - left for left, right in pairwise(across)), default=1.0)
+    names, size, is_upright = layout.output_names(champion, m, room)
+    look: styles.Look = {"fontsize": size, "rotation": 90 * is_upright, "linespacing": 1.0}
+    for output, name in zip(outputs, names, strict=True):
         top = places[m, output][1] + 0.08
-        axes.text(across[output], top, name, fontsize=size, ha="center", va="bottom", linespacing=1.0, zorder=5)
+        axes.text(across[output], top, name, ha="center", va="bottom", zorder=5, **look)
 
 
 def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
@@ -250,7 +244,7 @@ def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None
             look: styles.Look = {"fontsize": layout.KIND_SIZE, "rotation": 90, "ha": "center", "va": "top"}
             axes.text((left + right) / 2, y - 0.03, name, **look)
         return
-    if _POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
+    if layout.POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
         for k, name in enumerate(layout.input_names(champion, m)):
             y = places[m, -1 - k][1] - 0.07
             axes.text(x[k], y, name, fontsize=layout.NAME_SIZE, rotation=90, ha="center", va="top")

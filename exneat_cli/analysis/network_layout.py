@@ -19,12 +19,15 @@ Places = dict[Node, tuple[float, float]]
 """(x, y) of inputs and nodes."""
 
 # Inches. Links run in the gap between boxes. What a box keeps free of nodes: at its top, above outputs that drive
-# something, at its sides, and at its bottom, besides the names of inputs.
+# something (more where their names stand upright), at its sides, and at its bottom, besides the names of inputs.
 GAP = 0.3
 TITLE, OUTPUT_NAMES, SIDE, BELOW = 0.32, 0.3, 0.2, 0.15
 # Of a name below an input: its size in points, inches per character, and the characters that are shown at most.
 NAME_SIZE, CHARACTER, LONGEST_NAME = 5.0, 0.035, 48
 KIND_SIZE = 6.0  # points, of the name of many inputs
+# Points, of a name above an output: it stands upright where it would be smaller lying. Width of a letter as a share.
+LARGEST_LYING, SMALLEST_LYING, LETTER = 7.0, 3.5, 0.64
+POINTS = 72.0  # per inch
 # Least distances: of layers, of inputs, of outputs that carry a name, of a node from connections that pass it.
 LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
 
@@ -140,6 +143,35 @@ def below_inputs(champion: Champion) -> float:
     return BELOW + CHARACTER * max(8, *lengths)
 
 
+def output_names(champion: Champion, m: int, room: float) -> tuple[list[str], float, bool]:
+    """What stands above the outputs of module `m` that are `room` inches apart.
+
+    Returns the names of the actuators that they drive, their size in points and whether they stand upright.
+    """
+    names = [champion.actuators[actuator].replace("_", " ") for actuator in champion.plan.modules[m].drives]
+    lying = [name.replace(" (", "\n(") for name in names]  # the unit has a line of its own
+    widest = 1 + max((len(line) for name in lying for line in name.split("\n")), default=0)
+    size = POINTS * room / (LETTER * widest)
+    if size >= SMALLEST_LYING:
+        return lying, min(size, LARGEST_LYING), False
+    return names, min(NAME_SIZE, 0.9 * POINTS * room), True
+
+
+def above_outputs(champion: Champion, width: float) -> float:
+    """Inches above outputs that drive something, alike in all modules, on a page of that width."""
+    room = _box_width(champion, width) - 2 * SIDE
+    upright = []
+    for m, module in enumerate(champion.plan.modules):
+        names, _, is_upright = output_names(champion, m, room / module.outputs)
+        upright += names if is_upright else []
+    return max(OUTPUT_NAMES, BELOW + CHARACTER * max(map(len, upright), default=0))
+
+
+def _box_width(champion: Champion, width: float) -> float:
+    columns = max(len(row) for row in _rows(champion.plan.modules))
+    return (width - (columns - 1) * GAP) / columns
+
+
 def depths(hidden: Iterable[Node], edges: Collection[Edge]) -> dict[Node, int]:
     """Find the layers of inputs, which is 0, and of hidden nodes: one more than that of their deepest source.
 
@@ -171,8 +203,10 @@ def natural_size(champion: Champion) -> tuple[float, float]:
     room = max(*(INPUT * count for count in slots), *(ACTUATOR * len(module.drives) for module in modules))
     deepest = max(depths(hidden_of(champion), edges_of(champion)).values(), default=0)
     width = columns * (2 * SIDE + room) + (columns - 1) * GAP
-    height = len(rows) * (TITLE + OUTPUT_NAMES + below_inputs(champion) + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
-    return float(np.clip(width, 6.4, 12.0)), float(np.clip(height, 0.55 * width, 13.0).clip(4.0))
+    wide = float(np.clip(width, 6.4, 12.0))
+    besides = TITLE + above_outputs(champion, wide) + below_inputs(champion)
+    height = len(rows) * (besides + LAYER * (deepest + 1)) + (len(rows) - 1) * GAP
+    return wide, float(np.clip(height, 0.55 * width, 13.0).clip(4.0))
 
 
 def lay_out(champion: Champion, width: float, height: float, *, named: bool = True) -> tuple[list[Bbox], Places]:
@@ -181,8 +215,8 @@ def lay_out(champion: Champion, width: float, height: float, *, named: bool = Tr
     If `named`, there is room for the names of inputs.
     """
     rows = _rows(champion.plan.modules)
-    columns = max(len(row) for row in rows)
-    box_width = (width - (columns - 1) * GAP) / columns
+    box_width = _box_width(champion, width)
+    below, above = below_inputs(champion) if named else BELOW, above_outputs(champion, width)
     box_height = (height - (len(rows) - 1) * GAP) / len(rows)
     boxes: dict[int, Bbox] = {}
     places: Places = {}
@@ -191,7 +225,7 @@ def lay_out(champion: Champion, width: float, height: float, *, named: bool = Tr
         bottom = height - (r + 1) * box_height - r * GAP
         for c, m in enumerate(row):
             boxes[m] = Bbox.from_bounds(left + c * (box_width + GAP), bottom, box_width, box_height)
-            places |= _places(champion, m, boxes[m], below_inputs(champion) if named else BELOW)
+            places |= _places(champion, m, boxes[m], below, above)
     return [boxes[m] for m in sorted(boxes)], places
 
 
@@ -214,12 +248,12 @@ def _rows(modules: Sequence[Module]) -> list[list[int]]:
     return [sorted(row, key=lambda m: (right[m], m)) for row in rows]
 
 
-def _places(champion: Champion, m: int, box: Bbox, below: float) -> Places:
+def _places(champion: Champion, m: int, box: Bbox, below: float, above: float) -> Places:
     """Inputs of module `m` at the bottom, outputs at the top, hidden nodes in layers between them."""
     module = champion.plan.modules[m]
     edges = [edge for edge in edges_of(champion) if edge[0][0] == m]
     hidden = [node for node in hidden_of(champion) if node[0] == m]
-    bottom, top = box.y0 + below, box.y1 - TITLE - (OUTPUT_NAMES if module.drives else 0.0)
+    bottom, top = box.y0 + below, box.y1 - TITLE - (above if module.drives else 0.0)
     groups = input_groups(champion, m)
     slots = _spread(box, len(module.pins) + len(groups) - 1)
     # An empty slot between groups.

@@ -275,14 +275,22 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables, looks: 
             axes.plot(table.index, best.mean(axis=1), color=looks[variant]["color"], zorder=2, **_DASHED)
     if any(table.shape[1] > BEST for table in tables.values()):
         axes.plot([], [], color=GREY, label=f"mean of the {BEST} runs best on validation", **_DASHED)
-    trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
-    if trained is not None:
-        axes.axvline(trained, **AS_TRAINED)
+    _mark_training(axes, panel, study)
     tick_levels(axes, (level for table in tables.values() for level in table.index))
 
 
+def _mark_training(axes: Axes, panel: Panel, study: Study, levels: Sequence[float] = ()) -> None:
+    """Draw a line at the level at which runs were trained; `levels` that stand side by side have places from 0 on."""
+    trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
+    if trained is None:
+        return
+    place = np.interp(trained, levels, range(len(levels)), np.nan, np.nan) if levels else trained
+    if np.isfinite(place):  # else beside all levels that were tested
+        axes.axvline(float(place), **AS_TRAINED)
+
+
 def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables, looks: Looks) -> None:
-    """Variants stand side by side at each level."""
+    """Draw the variants side by side at each level."""
     levels = sorted({level for table in tables.values() for level in table.index})
     trained = [variant for variant in tables if variant not in study.baselines]
     room = 0.8 / len(trained)
@@ -297,6 +305,7 @@ def _draw_clusters(axes: Axes, panel: Panel, study: Study, tables: Tables, looks
             aside = (trained.index(variant) - (len(trained) - 1) / 2) * room
             _draw_points(axes, places + aside, table, look, label, room, size=12)
     axes.plot([], [], label="bar: mean over runs", **_BAR)
+    _mark_training(axes, panel, study, levels)
     axes.set_xticks(range(len(levels)), [f"{level:g}" for level in levels])
     axes.set_xlim(-0.6, len(levels) - 0.4)
     axes.grid(visible=False, axis="x")

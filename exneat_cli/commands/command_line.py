@@ -321,7 +321,8 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
     if isinstance(error, ConfigCompositionException) and (found := re.match(r"Could not override '(\w+)'", str(error))):
         of_robots = "\n  recipes are for robots: task=ant, task=robot" if found[1] == "recipe" else ""
-        return f"{found[1]}: expected nothing, since the task that was chosen has no {found[1]} to choose{of_robots}"
+        whose = "this command, or the task that was chosen,"
+        return f"{found[1]}: expected nothing, since {whose} has no {found[1]} to choose{of_robots}"
     first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
     if key := getattr(error, "full_key", None):
         first = f"{key}: {first}"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import finished_runs, name_code
-from exneat_cli.errors import ConfigError, check_choice, check_keys, check_section, check_text
+from exneat_cli.errors import ConfigError, check_choice, check_keys, check_path, check_section
 from exneat_cli.records.exports import FORMATS, export
 from exneat_cli.runs import load_champion, load_settings
 
@@ -24,14 +22,14 @@ def run(line: CommandLine) -> int:
     form, runs = plain["format"], finished_runs(plain["run"])
     output = plain["output"]
     if output is not None:
-        check_text("output", output, "a file, or for format=neat a directory")
+        output = check_path("output", output, "a file, or for format=neat a directory")
         if len(runs) > 1:
-            raise ConfigError("output", "null for several runs, each of which keeps its own", output)
+            raise ConfigError("output", "null for several runs, each of which keeps its own", plain["output"])
     loaded = [
         (directory, settings := load_settings(directory), load_champion(directory, settings)) for directory in runs
     ]
     for directory, settings, champion in loaded:
-        place = directory.path / "export" / FORMATS[form] if output is None else Path(output)
+        place = directory.path / "export" / FORMATS[form] if output is None else output
         for path in export(form, champion, settings.task, settings.evolution, place):
             print(f"Written: {path}")
     return 0

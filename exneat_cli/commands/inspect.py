@@ -39,7 +39,7 @@ def run(line: CommandLine) -> int:
     pattern = None if plain["run"] is None else check_path("run", plain["run"], "a run directory, or a pattern")
     if pattern is None:
         output = check_path("output", plain["output"])
-        found = find_runs(output, _tell_unreadable)
+        found = find_runs(output, tell_unreadable)
     else:
         found = runs_at(pattern)
         if len(found) == 1 or not glob.has_magic(str(pattern)):
@@ -60,5 +60,6 @@ def run(line: CommandLine) -> int:
     return 0
 
 
-def _tell_unreadable(error: OSError) -> None:
-    print(f"exneat: {error.filename}: cannot be read: {error.strerror}; runs in it are not listed", file=sys.stderr)
+def tell_unreadable(error: OSError) -> None:
+    """Name a folder that cannot be read, whose runs are missing then."""
+    print(f"exneat: {error.filename}: cannot be read: {error.strerror}; runs in it are left out", file=sys.stderr)

@@ -16,11 +16,12 @@ from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.inspect import tell_unreadable
 from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
-from exneat_cli.records import PublishedRun, RunDirectory, find_runs, read_published
+from exneat_cli.records import PublishedRun, find_runs, read_published, runs_at
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis", "columns", "style")
@@ -50,20 +51,16 @@ def run(line: CommandLine) -> int:
         name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
     }
     commands = {name: _command(sources[name], budgets[name], asked, line) for name in names}
-    lacking = ExneatError(
-        f"output={asked['output']}: no finished run of {', '.join(names)}\n  "
-        + (_own_experiments(asked, sources) or commands[names[0]])
-    )
     if not any(_has_any(experiments[name], budgets[name], asked["output"], rows[name]) for name in names):
         first = experiments[names[0]]  # planning all of them takes ten seconds
         one = replace(
             first, conditions=dict([*first.conditions.items()][:1]), variants=dict([*first.variants.items()][:1])
         )
         plan_jobs(one, budgets[names[0]], line, _OWN)  # refuses settings that make no sense
-        raise lacking
+        raise _nothing_to_report(asked, sources, commands)
     studies = {name: study_of(experiments[name], budgets[name], commands[name], line, rows[name]) for name in names}
     if not any(study.reached for study in studies.values()):
-        raise lacking
+        raise _nothing_to_report(asked, sources, commands)
     directory = Path(asked["output"]) / "report" / (own.name if own else "")
     built: list[Built] = []
     missing: dict[str, str] = {}
@@ -177,18 +174,28 @@ def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
     return {sweep: min(found) for sweep, found in levels.items() if len(found) == 1}
 
 
-def _own_experiments(asked: Mapping[str, Any], sources: Mapping[str, Any]) -> str:
-    """The commands that report on what other experiments the runs are of; empty if there are none."""
+def _nothing_to_report(
+    asked: Mapping[str, Any], sources: Mapping[str, Any], commands: Mapping[str, str]
+) -> ExneatError:
+    """Say what there is instead, of other experiments or of none, and the commands for it."""
     found: dict[str, None] = {}
-    for run in find_runs(Path(asked["output"])):
+    alone = 0
+    for run in find_runs(Path(asked["output"]), tell_unreadable):
         try:
             words = run.read_manifest().command
         except ExneatError:
             continue
-        found |= dict.fromkeys(word for word in words if word.startswith("experiment="))
+        of = [word for word in words if word.startswith("experiment=")]
+        found |= dict.fromkeys(of)
+        alone += not of
+    nothing = f"output={asked['output']}: no finished run of {', '.join(commands)}\n"
     others = [word for word in found if word.partition("=")[2] not in map(str, sources.values())]
-    reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
-    return f"there are runs of another experiment: {reports}" if reports else ""
+    if others:
+        reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
+        return ExneatError(f"{nothing}  there are runs of another experiment: {reports}")
+    listing = shlex.join(["exneat", "inspect", *_place(asked)])
+    compared = f"  there are runs of no experiment, which {listing} compares; those of one come from\n"
+    return ExneatError(f"{nothing}{compared if alone else ''}  {next(iter(commands.values()))}")
 
 
 def _largest_budget(experiment: Experiment, output: str, rows: Sequence[PublishedRun]) -> str:
@@ -204,5 +211,4 @@ def _has_any(experiment: Experiment, budget: str, output: str, rows: Sequence[Pu
     if any(row.budget == budget for row in rows):
         return True
     folders = [Path(output) / f"{experiment.name}-{condition}-{budget}" for condition in experiment.conditions]
-    manifests = (path for folder in folders for path in folder.glob("*/manifest.json"))
-    return any(RunDirectory(path.parent).is_finished() for path in manifests)
+    return any(run.is_finished() for folder in folders for run in runs_at(folder / "*"))

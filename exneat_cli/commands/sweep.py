@@ -87,7 +87,7 @@ def experiment_names() -> list[str]:
 def results_file(name: str) -> Path:
     """Where the published rows of an experiment are: ``results/<name>.csv`` beside its YAML file."""
     own = name.endswith((".yaml", ".yml"))
-    path = Path(name) if own else shipped_directory("experiments") / f"{name}.yaml"
+    path = check_path("experiment", name) if own else shipped_directory("experiments") / f"{name}.yaml"
     return path.parent / "results" / f"{path.stem}.csv"
 
 

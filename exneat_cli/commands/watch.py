@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from exneat_cli.commands.command_line import CommandLine
@@ -15,9 +14,9 @@ from exneat_cli.errors import (
     check_choice,
     check_flag,
     check_keys,
+    check_path,
     check_real,
     check_section,
-    check_text,
     check_whole,
 )
 from exneat_cli.records import RunDirectory
@@ -60,7 +59,8 @@ def run(line: CommandLine) -> int:
     if plain["live"]:
         show(frames, frames_of(scenes), fps, plain["port"])
         return 0
-    path = Path(output) if output is not None else runs[0].path / "plots" / f"{_stem(plain)}.{form}"
+    beside = runs[0].path / "plots" / f"{_stem(plain)}.{form}"
+    path = beside if output is None else check_path("output", output, "a file")
     count = write_video(path, frames, fps, form)
     print(f"Written: {path} ({count} frames, {count / fps:.1f} s)")
     return 0
@@ -98,7 +98,7 @@ def _check(plain: Mapping[str, Any]) -> None:
     for side in ("width", "height"):
         check_whole(side, plain[side], 64, 4096)
     if plain["output"] is not None:
-        check_text("output", plain["output"], "a file")
+        check_path("output", plain["output"], "a file")
     check_flag("live", plain["live"])
     check_whole("port", plain["port"], 0, 65535)
     if plain["live"] and plain["output"] is not None:

@@ -32,6 +32,8 @@ from exneat_cli.records.manifest import (
 from exneat_cli.records.plain import read_json, read_yaml
 
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
+_ABSENT = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG)
+"""Errors that say that nothing is there; by others nobody can tell."""
 _TRIES, _PAUSE = 3, 0.02
 """How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
 
@@ -201,7 +203,7 @@ class RunDirectory:
         try:
             os.stat(self.manifest)
         except OSError as error:
-            if error.errno not in (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG):
+            if error.errno not in _ABSENT:
                 raise ExneatError(f"{self.path}: cannot be read: {error.strerror}") from error
             return False
         return True
@@ -259,7 +261,7 @@ def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None)
     """
 
     def tell(error: OSError) -> None:
-        if unreadable and error.errno not in (errno.ENOENT, errno.ENOTDIR):
+        if unreadable and error.errno not in _ABSENT:
             unreadable(error)
 
     found: list[tuple[int, Path]] = []
@@ -273,12 +275,26 @@ def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None)
 
 
 def runs_at(pattern: Path) -> list[RunDirectory]:
-    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it."""
+    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it.
+
+    Raises:
+        ExneatError: a folder where runs may be cannot be read.
+    """
     found = [Path()]
     for part in pattern.parts:
         literal = [path / part for path in found if os.path.lexists(path / part)]
-        found = literal or [path / each for path in found for each in sorted(glob(part, root_dir=path))]
+        found = literal or [path / each for path in found for each in _fitting(path, part)]
     return [run for path in found if (run := RunDirectory(path)).is_there()]
+
+
+def _fitting(folder: Path, part: str) -> list[str]:
+    try:
+        os.scandir(folder).close()  # of whose errors `glob` makes nothing
+    except OSError as error:
+        if error.errno in _ABSENT:
+            return []
+        raise ExneatError(f"{folder}: cannot be read: {error.strerror}") from error
+    return sorted(glob(part, root_dir=folder))
 
 
 def _lock(directory: Path, descriptor: int) -> None:

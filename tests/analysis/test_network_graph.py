@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +159,24 @@ def test_links_are_dashed_where_delayed_and_sensors_outputs_and_modules_carry_th
     assert {f"eye {k} (cd)" for k in range(9)} <= texts
     assert {"hip 1\n(3 N m)", "ankle 1", "front left  (genome 1, shared by 4)", "central"} <= texts
     assert {"hidden 0 of front right", "output 0 of back left"} <= texts
+
+
+@pytest.mark.parametrize("modules", [1, 3], ids=["alone", "between two others"])
+def test_names_of_many_actuators_do_not_overprint(modules: int) -> None:
+    joints = [
+        f"{side} {joint} {axis} (40 N m)" for side in ("left", "right") for joint in ("hip", "arm") for axis in "xyzw"
+    ]
+    body = a_module("body", (0.0, 0.0), 0, pins=[reads(0)], outputs=len(joints), drives=list(range(len(joints))))
+    sides = [a_module(f"eye {y}", (0.0, y), 1, pins=[reads(0)], outputs=1) for y in (1.0, -1.0)]
+    genomes = [a_genome(range(outputs), [(-1, 0, 1.0)]) for outputs in (len(joints), 1)]
+    champion = champion_of(a_champion([body, *sides][:modules], genomes[:modules], joints, 1))
+    axes = Figure(figsize=natural_size(champion)).add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_champion(axes, champion, *natural_size(champion))
+    assert set(joints) <= {text.get_text().replace("\n", " ") for text in axes.texts}
+    axes.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert all(axes.get_window_extent().containsx(box.x0) for box in boxes)
 
 
 def test_inputs_that_are_too_many_to_be_named_are_counted() -> None:

@@ -1,4 +1,4 @@
-"""The page of a report in headless Chromium: sorted, filtered, narrow, and asking the network for nothing."""
+"""The page of a report in headless Chromium: sorted, filtered, narrow, dark, on paper, and without the network."""
 
 from __future__ import annotations
 
@@ -30,10 +30,26 @@ click();
 const after = column(1);
 const box = [...document.querySelectorAll("#filter label")].find((label) => label.textContent.trim() === "ExNEAT");
 box.querySelector("input").click();
+const [style] = document.styleSheets;
+const shownAs = (condition, ask) => {
+  const rule = [...style.cssRules].find((rule) => rule.media && rule.media.mediaText === condition);
+  rule.media.mediaText = "all";
+  const answer = ask((query) => getComputedStyle(document.querySelector(query)));
+  rule.media.mediaText = condition;
+  return answer;
+};
+const filtered = column(1);
+const asked = performance.getEntriesByType("resource").map((entry) => entry.name.slice(0, 5));
+const width = document.documentElement.scrollWidth;
+const dark = shownAs("(prefers-color-scheme: dark)", (look) => [look("body").backgroundColor, look("body").color]);
+document.body.style.width = "700px";  // A4 without its margins
+const paper = shownAs("print", (look) => ({
+  rows: [...table.tBodies[0].rows].filter((row) => row.getBoundingClientRect().height > 0).length,
+  widest: Math.max(...[...document.querySelectorAll("table")].map((each) => each.getBoundingClientRect().width)),
+  cut: look(".scroll").overflowX, afterHeading: look("h2").breakAfter, withinFigure: look("img").breakInside,
+}));
 document.body.dataset.found = JSON.stringify({
-  before, up, down, after, filtered: column(1),
-  asked: performance.getEntriesByType("resource").map((entry) => entry.name.slice(0, 5)),
-  width: document.documentElement.scrollWidth, room: innerWidth,
+  before, up, down, after, filtered, asked, width, room: innerWidth, dark, paper,
 });
 </script>
 """
@@ -54,7 +70,7 @@ def tried(page: Path) -> tuple[dict[str, Any], str]:
 
 
 @pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed here")
-def test_tables_are_sorted_and_filtered_without_network_or_complaints_and_fit_a_narrow_window(tmp_path: Path) -> None:
+def test_the_page_is_sorted_filtered_narrow_dark_and_printed_without_network_or_complaints(tmp_path: Path) -> None:
     found, complaints = tried(a_report(tmp_path))
     numbers = [float(text) for text in found["up"] if text]
     assert len(set(numbers)) > 1
@@ -65,4 +81,8 @@ def test_tables_are_sorted_and_filtered_without_network_or_complaints_and_fit_a_
     assert found["filtered"] == ["NEAT", "random actions"] * 2
     assert not [kind for kind in found["asked"] if kind.startswith("http")]
     assert found["width"] <= found["room"]
+    ground, words = (sum(map(int, re.findall(r"\d+", colour))) for colour in found["dark"])
+    assert ground < 150 < 600 < words
+    assert found["paper"].pop("widest") <= 700
+    assert found["paper"] == {"rows": 6, "cut": "visible", "afterHeading": "avoid", "withinFigure": "avoid"}
     assert not complaints

@@ -213,12 +213,19 @@ def test_the_dashed_line_is_the_mean_of_the_five_runs_best_on_validation_unless_
         np.testing.assert_allclose(line.get_ydata(), fading * (0.3 + 0.013 * np.mean([2, 3, 4, 5, 6])))
 
 
+def marks_of_training(study: Study, kind: str) -> list[float]:
+    lines = [line for line in drawn(study, kind)[0].get_lines() if line.get_label() == "as in training"]
+    return [float(x) for line in lines for x in set(line.get_xdata())]
+
+
 def test_the_level_of_training_is_marked(tmp_path: Path) -> None:
     study = a_study(tmp_path)
-    assert "as in training" not in [line.get_label() for line in drawn(study, "robustness")[0].get_lines()]
-    trained = replace(study, trained={key: {"sensor_noise": 0.1, "gap": 0.2} for key in study.conditions})
-    (mark,) = (line for line in drawn(trained, "robustness")[0].get_lines() if line.get_label() == "as in training")
-    assert set(mark.get_xdata()) == {0.1}
+    # In clusters levels stand at whole numbers, whatever is between them.
+    for kind, marks in {"robustness": {0.1: [0.1], 9.0: [9.0]}, "cluster": {0.1: [1.0], 0.05: [0.5], 9.0: []}}.items():
+        assert marks_of_training(study, kind) == []
+        for level, expected in marks.items():
+            trained = {key: {"sensor_noise": level, "gap": 0.2} for key in study.conditions}
+            assert marks_of_training(replace(study, trained=trained), kind) == expected
 
 
 def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import matplotlib as mpl
 import pytest
 
 from exneat_cli.analysis import draw_path, draw_robustness, draw_training
@@ -40,13 +41,16 @@ def draw_all(run: RunDirectory) -> list[Path]:
 
 
 @pytest.mark.parametrize("place", ["ground", "tiles", "nowhere"])
-def test_the_same_data_gives_the_same_bytes_and_nothing_is_cut_off(tmp_path: Path, place: str) -> None:
+def test_the_same_data_gives_the_same_bytes_whatever_a_user_set_and_nothing_is_cut_off(
+    tmp_path: Path, place: str
+) -> None:
     one, other = (a_run(tmp_path / copy / "run", sweeps=4, place=place) for copy in ("a", "b"))
     written = draw_all(one)
     assert [path.stem for path in written] == ["training"] * 2 + ["path"] * 2 + ["robustness"] * 2
     assert all(has_white_edges(path) for path in written if path.suffix == ".png")
     assert "training fitness (forward reward)" in texts_of(one.plots / "training.svg")
-    draw_all(other)
+    with mpl.rc_context({"text.usetex": True, "font.family": "cursive", "font.size": 30.0, "axes.grid": True}):
+        draw_all(other)
     assert contents(one.plots) == contents(other.plots)
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import read_job
+from exneat_cli.commands.sweep import results_file
 from exneat_cli.errors import ConfigError, check_path
 from exneat_cli.main import main
 from exneat_cli.runs import RunSettings
@@ -51,7 +52,7 @@ TRAIN = {
     "judging=first": "judging: expected one of last, mean",
     "champion=lucky": "champion: expected one of race, thesis",
     "recipe=running": "recipe=running: no such option; known: thesis, walking",
-    "task=hunting recipe=thesis": "recipe: expected nothing, since the task that was chosen has no recipe to choose",
+    "task=hunting recipe=thesis": "recipe: expected nothing, since this command, or the task that was chosen,",
     "linkage=hidden": "recipe=thesis has hidden nodes",
     "linkage=feedback": "recipe=thesis has hidden nodes and a central module",
     "wiring.central=true": "recipe=thesis has hidden nodes and a central module",
@@ -401,6 +402,7 @@ def test_a_path_in_a_file_of_ones_own_begins_at_home_where_a_tilde_says_so(
         assert Path(make("~/x")) == tmp_path / "home" / "x"
     with pytest.raises(ConfigError, match=r"got '~/no\.xml'"):
         path_of("~/no.xml")
+    assert results_file("~/mine.yaml") == tmp_path / "home" / "results" / "mine.csv"
     (tmp_path / "home").mkdir()
     (tmp_path / "home" / "yes.xml").touch()
     assert path_of("~/yes.xml").exists()

@@ -118,6 +118,7 @@ BAD = {
     "sweep=sensor_noise sweep.level=[1]": "sweep.level: unknown key (value [1])\n  did you mean sweep.levels?",
     "sweep=sensor_noise sweep.episodes=0": "sweep.episodes: expected",
     "sweep=sensor_noise seed=1": "seed: unknown key",
+    "sweep=sensor_noise budget=smoke": "budget: expected nothing, since this command, or the task that was chosen,",
     "sweep=sensor_noise executor.workers=-1": "executor.workers: expected",
     "sweep=gap executor.foo=1": "executor.foo: unknown key",
 }

@@ -50,12 +50,13 @@ def test_a_champion_is_written_into_its_run_and_said_where(
 
 
 def test_champions_of_a_pattern_keep_their_own_files_and_one_goes_where_the_user_wants(
-    runs: Path, tmp_path: Path
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
     assert main(["export", f"run={runs}/*neat-*"]) == 0
     assert len(list(runs.glob("*/export/champion.py"))) == 2
     path = tmp_path / "new" / "agent.py"
-    assert main(["export", f"run={run_of(runs, 'neat')}", f"output={path}"]) == 0
+    assert main(["export", f"run={run_of(runs, 'neat')}", "output='~/new/agent.py'"]) == 0
     champion = runpy.run_path(str(path))["Champion"]()
     assert champion.act(np.full(8, 0.5)).shape == (5,)
     assert [each.name for each in path.parent.iterdir()] == ["agent.py"]

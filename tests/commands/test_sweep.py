@@ -276,6 +276,18 @@ def test_settings_may_be_left_out_and_a_report_names_the_experiment_that_there_a
     capsys.readouterr()
     assert main(["report", f"output={tmp_path / 'out'}"]) == 2
     assert f"exneat report experiment={path} output={tmp_path / 'out'}" in capsys.readouterr().err
+    alone = f"output={tmp_path / 'alone'}"
+    assert main(["train", "task=general_maze", "algorithm=random", "budget=smoke", alone]) == 0
+    capsys.readouterr()
+    assert main(["report", "experiment=ant", alone]) == 2
+    assert capsys.readouterr().err.splitlines()[1:] == [
+        f"  there are runs of no experiment, which exneat inspect {alone} compares; those of one come from",
+        f"  exneat sweep experiment=ant budget=quick {alone}",
+    ]
+    folder = tmp_path / "alone" / f"ant-{next(iter(read_experiment('ant').conditions))}-quick"
+    folder.symlink_to(folder)
+    assert main(["report", "experiment=ant", alone]) == 2
+    assert capsys.readouterr().err == f"exneat: {folder}: cannot be read: Too many levels of symbolic links\n"
 
 
 @pytest.mark.parametrize("label", ["", " ", "NEAT", " NEAT "])

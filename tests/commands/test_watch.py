@@ -86,11 +86,14 @@ def test_a_grid_world_plays_in_every_format(form: str, runs: Path) -> None:
     assert [path.name for path in (run / "plots").iterdir() if path.name.startswith(".")] == []
 
 
-def test_runs_stand_side_by_side_without_panels_and_under_noise(runs: Path, tmp_path: Path) -> None:
+def test_runs_stand_side_by_side_without_panels_and_under_noise(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
     pytest.importorskip("imageio_ffmpeg", reason=FFMPEG)
     noisy = ["sweep=sensor_noise", "level=0.3", "episode=2", "workers=1", "width=160", "height=120"]
     path = tmp_path / "new" / "both.gif"
-    assert main(["watch", f"run={runs}/foraging/exneat-*", *noisy, f"output={path}", "format=gif"]) == 0
+    assert main(["watch", f"run={runs}/foraging/exneat-*", *noisy, "output='~/new/both.gif'", "format=gif"]) == 0
     assert {frame.shape for frame in decoded(path)} == {(120, 320, 3)}
     run = run_of(runs, "foraging/exneat-*-s0-*")
     assert main(["watch", f"run={run}", *noisy, "panel=none", "format=gif"]) == 0

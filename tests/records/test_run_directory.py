@@ -21,6 +21,7 @@ from exneat_cli.records import (
     Score,
     configuration_hash,
     find_runs,
+    runs_at,
 )
 
 SETTINGS = {"generations": 5, "seed": 0, "task": {"name": "ant", "patience": 100}}
@@ -88,6 +89,11 @@ def test_folders_that_cannot_be_read_are_told_and_the_others_searched(
     assert [error.filename for error in told] == [str(tmp_path / "closed")]
     assert find_runs(tmp_path / "nowhere", told.append) == find_runs(tmp_path / "closed") == []
     assert len(told) == 1
+    assert [run.path.name for run in runs_at(tmp_path / "b" / "*")] == ["one", "two"]
+    assert runs_at(tmp_path / "nowhere" / "*") == []
+    for pattern in ("closed/*", "*/*"):
+        with pytest.raises(ExneatError, match="closed: cannot be read: Permission denied"):
+            runs_at(tmp_path / pattern)
 
 
 @pytest.mark.parametrize("status", ["running", "failed", "interrupted"])

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from gymnasium import spaces
@@ -17,8 +20,10 @@ from exneat_cli.records import build
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings
 from exneat_cli.seeding import training_episodes
-from exneat_cli.tasks import ENDED, FAILED, RUNNING, Simulation
+from exneat_cli.tasks import ENDED, FAILED, RUNNING, Simulation, Task
 from exneat_cli.tasks.gym import GymTask
+from exneat_cli.tasks.robots import models
+from exneat_cli.tasks.robots.robot import RobotTask
 from tests.rollouts.drifting import random_brains
 from tests.tasks import environments  # noqa: F401  registers some
 
@@ -233,3 +238,21 @@ def test_an_environment_with_pictures_is_filmed_in_its_own_time_and_others_are_r
     drawable = GymTask(env_id=CHOOSING, kwargs={"pictures": False}).drawable()
     with pytest.raises(ExneatError, match=r"expected a picture of \(height, width, 3\) bytes, got"):
         drawable.snapshot(opened(drawable).world)
+
+
+@pytest.mark.parametrize(
+    "task", [GymTask(env_id="HalfCheetah-v5"), RobotTask(model="half_cheetah")], ids=["gym", "robot"]
+)
+def test_what_mujoco_says_of_a_model_is_neither_shown_nor_logged_for_any_world(
+    task: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    task.open(training=True)
+    mujoco.set_mju_user_warning(None)  # as if nothing had been opened yet
+    gymnasium.make("HalfCheetah-v5")
+    assert "'settotalmass' is deprecated" in "".join(capfd.readouterr())
+    Path("MUJOCO_LOG.TXT").unlink()
+    models._load.cache_clear()
+    with ThreadPoolExecutor(3) as threads:
+        assert len(list(threads.map(lambda _: task.open(training=True), range(3)))) == 3
+    assert (list(capfd.readouterr()), list(tmp_path.iterdir())) == (["", ""], [])
