@@ -11,7 +11,8 @@ from typing import Any
 
 from exneat_cli.analysis.catalogue import Built, FigurePlan, Panel, TablePlan, read_catalogue
 from exneat_cli.analysis.index_page import write_index
-from exneat_cli.analysis.report_figures import AXES, draw_figure
+from exneat_cli.analysis.report_figures import draw_figure
+from exneat_cli.analysis.report_panels import AXES
 from exneat_cli.analysis.study import MissingRunsError, PlannedRun, Study
 from exneat_cli.analysis.styles import Paper, read_style_sheet
 from exneat_cli.analysis.tables import build_comparison, build_table

@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 from msgspec.structs import replace as changed
 
 from exneat_cli.analysis.catalogue import FIGURE_KINDS, FigurePlan, Panel
-from exneat_cli.analysis.report_figures import common_curves, draw_figure, draw_panel
+from exneat_cli.analysis.report_figures import draw_figure
+from exneat_cli.analysis.report_panels import common_curves, draw_panel
 from exneat_cli.analysis.study import MissingRunsError, Study
 from exneat_cli.analysis.styles import Paper, read_style_sheet, variant_styles
 from exneat_cli.errors import ExneatError
