@@ -1,9 +1,4 @@
-"""The command line of every command: flags, and settings written key=value, which Hydra composes with YAML files.
-
-A value means the same in every command. One that Hydra's grammar cannot read is text as it stands, so that paths may
-hold brackets, quotes and letters of any script. What stands in quotes of its own, such as ``"name='3'"``, is text
-whatever it looks like, and so is what is given for a name or a path.
-"""
+"""The command line of every command: flags, and settings written key=value, which Hydra composes with YAML files."""
 
 from __future__ import annotations
 
@@ -11,7 +6,6 @@ import argparse
 import contextlib
 import copy
 import itertools
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,20 +16,16 @@ import hydra
 import yaml
 from hydra._internal.config_loader_impl import ConfigLoaderImpl
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override, Quote, QuotedString, ValueType
+from hydra.core.override_parser.types import Override
 from hydra.errors import ConfigCompositionException, HydraException, MissingConfigException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, InterpolationKeyError, OmegaConfBaseException
 
+from exneat_cli.commands.setting import LONGEST, as_written, is_hydras, read_setting
 from exneat_cli.commands.shipped import section_of, shipped_directory, yaml_file
-from exneat_cli.errors import ConfigError, ExneatError, check_keys, nearest
+from exneat_cli.errors import ExneatError, check_keys, nearest
 
-_OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
-"""Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
 _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-name", "--cfg")
-_TEXTS = {"name", "output", "run", "experiment", "only", "space", "style", "task.model", "task.env_id"}
-"""Settings that are names and paths: what is typed for them is text, also where it looks like a number or a list."""
-_LONGEST = 300
 
 
 @dataclass(frozen=True)
@@ -166,13 +156,6 @@ def _check_there(plain: Mapping[str, Any], keys: Sequence[str]) -> None:
             raise ExneatError(f"{key}: is missing")
 
 
-def as_written(value: object) -> str:
-    """A value as Hydra's grammar writes it; text stands in quotes, so that it is taken as it is."""
-    if isinstance(value, list):
-        return f"[{','.join(map(as_written, value))}]"
-    return QuotedString(value, Quote.single).with_quotes() if isinstance(value, str) else json.dumps(value)
-
-
 def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
     """Read flags and settings, in any order.
 
@@ -198,8 +181,8 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         words=("exneat", command, *arguments),
         primary=flags.config_name or ("config" if command == "train" else command),
         directories=directories,
-        settings=tuple(text for text in read if not _is_hydras(text)),
-        launcher=tuple(text for text in read if _is_hydras(text)),
+        settings=tuple(text for text in read if not is_hydras(text)),
+        launcher=tuple(text for text in read if is_hydras(text)),
         config_path=flags.config_path,
         multirun=flags.multirun,
         shown="help" if flags.help else flags.cfg or "",
@@ -231,71 +214,6 @@ def _directory(text: str) -> Path:
     return directory
 
 
-def _is_hydras(text: str) -> bool:
-    return text.lstrip("+").startswith(("hydra.", "hydra/"))
-
-
-def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = False) -> str:
-    """Return the setting as Hydra's composition takes it; an unknown key passes, for dataclasses know the nearest one.
-
-    Raises:
-        ExneatError: it cannot be read, is not the user's to make, or has several values unless in a multirun.
-    """
-    readable, override = _parsed(text)
-    key = override.key_or_group
-    if not key:
-        raise ExneatError(f"{text}: expected key=value, got no key")
-    if override.is_delete():
-        raise ExneatError(f"{text}: a setting cannot be deleted; leave it out, or give it the value you want")
-    if override.is_sweep_override() and not (multirun and override.is_discrete_sweep() and not _is_hydras(key)):
-        raise ExneatError(
-            f"{text}: expected one value, got several\n"
-            f"  exneat train -m goes through them (--multirun); a list is written {key}=[...], text in quotes"
-        )
-    section, _, name = key.replace("/", ".").partition(".")
-    if section == "hydra":
-        if not name.startswith(_OF_LAUNCHERS):
-            fix = "hydra/launcher=, hydra.launcher.* and hydra.sweep.dir= are yours to set, output= says where runs go"
-            raise ExneatError(f"{text}: exneat sets hydra.{name} itself\n  {fix}")
-        return readable
-    if not any((directory / key).is_dir() for directory in directories):
-        return f"++{readable.lstrip('+')}"
-    if not override.is_sweep_override():
-        value = override.value()
-        if isinstance(value, list) and key != "sweep":  # of which several may be chosen at once
-            raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
-        if not isinstance(value, str | list):
-            raise ConfigError(key, "the name of an option", value)
-    return readable
-
-
-def _parsed(text: str) -> tuple[str, Override]:
-    """A setting that Hydra's grammar reads, and what it reads."""
-    parser = OverridesParser.create()
-    key, separator, value = text.partition("=")
-    quoted = f"{key}={as_written(value.strip())}"
-    for readable in (text, quoted) if separator else (text,):
-        with contextlib.suppress(HydraException):
-            override = parser.parse_override(readable)
-            if key.lstrip("+") not in _TEXTS or override.is_delete():
-                return readable, override
-            if override.is_sweep_override():
-                return _parsed_texts(readable, override)
-            is_text = override.value() is None or isinstance(override.value(), str)
-            return (readable, override) if is_text else (quoted, parser.parse_override(quoted))
-    raise ExneatError(f"{text[:_LONGEST]}: expected key=value, e.g. seed=3")
-
-
-def _parsed_texts(text: str, override: Override) -> tuple[str, Override]:
-    """Several values of a setting whose values are text."""
-    key, _, value = text.partition("=")
-    each = value.split(",")
-    if override.value_type != ValueType.SIMPLE_CHOICE_SWEEP or len(each) != len(list(override.sweep_iterator())):
-        return text, override  # commas within quotes or brackets
-    texts = f"{key}=" + ",".join(_parsed(f"{key}={one}")[0].partition("=")[2] for one in each)
-    return texts, OverridesParser.create().parse_override(texts)
-
-
 def in_words(error: BaseException, directories: Sequence[Path]) -> str:
     """What Hydra, OmegaConf or YAML say, in one or two lines that name the file, the setting, or the known options."""
     error = error if str(error) else error.__cause__ or error
@@ -323,7 +241,7 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         of_robots = "\n  recipes are for robots: task=ant, task=robot" if found[1] == "recipe" else ""
         whose = "this command, or the task that was chosen,"
         return f"{found[1]}: expected nothing, since {whose} has no {found[1]} to choose{of_robots}"
-    first = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
+    first = (str(error).strip() or type(error).__name__).splitlines()[0][:LONGEST]
     if key := getattr(error, "full_key", None):
         first = f"{key}: {first}"
     if isinstance(error, InterpolationKeyError):

@@ -10,7 +10,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from exneat_cli.commands.command_line import CommandLine, as_written
+from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.setting import as_written
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_keys, check_path, check_section
 from exneat_cli.records import RunDirectory, runs_at
 from exneat_cli.rollouts import Executor, Sweep

@@ -17,8 +17,9 @@ from typing import Any
 
 import msgspec
 
-from exneat_cli.commands.command_line import CommandLine, as_written, read_setting
+from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import Job, read_job
+from exneat_cli.commands.setting import as_written, read_setting
 from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.errors import ConfigError, ExneatError, check_path, check_text, check_whole
 from exneat_cli.records import RunDirectory, converted, make_directory, read_yaml

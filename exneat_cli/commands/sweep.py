@@ -15,11 +15,12 @@ import yaml
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from exneat_cli.commands.command_line import CommandLine, as_written, in_words, read_setting
+from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import BUDGETS, Job, check_known, read_job
 from exneat_cli.commands.publishing import Publisher
 from exneat_cli.commands.run_table import print_table
 from exneat_cli.commands.series import do_jobs, unfinished
+from exneat_cli.commands.setting import as_written, read_setting
 from exneat_cli.commands.shipped import shipped_directory
 from exneat_cli.errors import (
     ConfigError,
