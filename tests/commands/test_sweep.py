@@ -264,8 +264,9 @@ def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_pa
 
 
 def test_settings_may_be_left_out_and_a_report_names_the_experiment_that_there_are_runs_of(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("exneat_cli.commands.report.read_published", lambda path: [])
     path = tmp_path / "small.yaml"
     random = {"label": "random", "settings": {"task": "general_maze", "algorithm": "random"}}
     parts = {"conditions": {"clean": {"label": "clean"}}, "claim": "None.", "runs": {"smoke": 1}}
