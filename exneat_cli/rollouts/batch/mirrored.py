@@ -28,11 +28,11 @@ class Mirrored:
 
     def write(self, row: int, values: NDArray[Any]) -> None:
         """Set entries from the begin of a row of the first axis on."""
-        width = self.here[0].size
-        self.here.reshape(-1)[row * width : row * width + values.size] = values.ravel()
-        per_entry = self.here.size // self._source.size
-        place = {"dest_offset": row * width // per_entry, "src_offset": row * width // per_entry}
-        wp.copy(self.there, self._source, **place, count=values.size // per_entry)
+        first = row * self.here[0].size
+        self.here.reshape(-1)[first : first + values.size] = values.ravel()
+        numbers = self.here.size // self._source.size  # in each of the device's entries, which may be vectors
+        place, count = first // numbers, values.size // numbers
+        wp.copy(self.there, self._source, dest_offset=place, src_offset=place, count=count)
 
     def resized(self, values: NDArray[Any]) -> Mirrored:
         """Another one of the same kind."""

@@ -136,21 +136,22 @@ class Stage:
 
     def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
         """Enlarge what is too small; what is there stays, and the program is captured anew."""
-        slots, room = self._slots, self._outcome.status.shape[1]
-        is_short = words > self._programs.here.shape[1], memory > self._memory.shape[1], episodes > self._episodes
-        if any(is_short) or jobs > room:
-            self._graph = None
-        if is_short[0]:
+        slots = self._slots
+        if words > self._programs.here.shape[1]:
             self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
-        if is_short[1]:
+            self._graph = None
+        if memory > self._memory.shape[1]:
             self._memory = _grown(self._memory, (self._memory.shape[0], _ample(memory)))
-        if is_short[2]:
+            self._graph = None
+        if episodes > self._episodes:
             self._grow_episodes(episodes)
-        if jobs > room:
+            self._graph = None
+        if jobs > self._outcome.status.shape[1]:
             for name in ("status", "steps", "totals"):
                 array = getattr(self._outcome, name)
                 setattr(self._outcome, name, _grown(array, (slots, _ample(jobs), *array.shape[2:])))
             self._grow_queue(slots * _ample(jobs))
+            self._graph = None
 
     def _grow_episodes(self, episodes: int) -> None:
         before, slots = self._episodes, self._slots
