@@ -132,19 +132,9 @@ class RunSettings:
             fix = "run directories stay below output=; set that to write elsewhere"
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         self._settle()
-        if self.executor.name == "warp":
-            self._check_batches()
-        self.algorithm.check(self.problem)
-
-    def _check_batches(self) -> None:
-        """Refuse what does not run in batches on a GPU."""
-        if not isinstance(self.task, HasBatch):
+        if self.executor.name == "warp" and not isinstance(self.task, HasBatch):
             raise ConfigError("executor", f"another one with task={self.task.name}", "warp", "only robots run there")
-        if self.wants_moments:
-            fix = "executor=threads gathers the statistics of what is sensed, which it needs"
-            if self.evolution.safe_mutation:
-                fix = f"{fix}; or evolution.safe_mutation=false"
-            raise ConfigError("executor", f"another one with algorithm={self.algorithm.name}", "warp", fix)
+        self.algorithm.check(self.problem)
 
     def _settle(self) -> None:
         """Put numbers and words in place of what is left to the task and to how its parts share genomes."""

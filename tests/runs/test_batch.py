@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from exneat_cli.algorithms import EvolutionSettings
 from exneat_cli.errors import ConfigError, ExneatError
 from exneat_cli.rollouts import Executor, Noise, Outcomes, Runner, keep_workers
 from exneat_cli.runs import RunSettings, train
@@ -24,6 +25,7 @@ wp = pytest.importorskip("warp", reason="needs exneat[gpu]")
 
 ANT = RobotTask(model="ant", control_period=0.01, max_steps=12, patience=4, progress=0.002)
 NOISE = Noise(sensor_std=0.05)
+SAFE = EvolutionSettings(initial_connection="full_direct", module_hidden=0, safe_mutation=True)
 
 
 def on_warp(worlds: int) -> Executor:
@@ -61,9 +63,9 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_bytes(tmp_path: Path) -> Non
     assert "float32" in resumed.summary
 
 
-def outcomes(executor: Executor) -> Outcomes:
+def outcomes(executor: Executor, *, moments: bool = False) -> Outcomes:
     with Runner(ANT, Noise(), executor, training=True) as runner:
-        return runner.run(random_brains(5, ANT), training_episodes(3, 0, 2))
+        return runner.run(random_brains(5, ANT), training_episodes(3, 0, 2), moments=moments)
 
 
 def test_episodes_end_as_on_the_cpu_though_there_are_fewer_worlds_than_episodes() -> None:
@@ -73,6 +75,21 @@ def test_episodes_end_as_on_the_cpu_though_there_are_fewer_worlds_than_episodes(
     np.testing.assert_array_equal(came.failed, expected.failed)
     np.testing.assert_allclose(came.fitness, expected.fitness, rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(came.full_reward, expected.full_reward, rtol=0.0, atol=1e-3)
+
+
+def test_what_networks_sense_has_the_statistics_that_it_has_on_the_cpu() -> None:
+    expected, came = (outcomes(executor, moments=True).moments for executor in (SERIAL, on_warp(3)))
+    assert expected is not None
+    assert came is not None
+    np.testing.assert_array_equal(came[0], expected[0])
+    np.testing.assert_allclose(came[1], expected[1], rtol=0.0, atol=1e-4)
+    np.testing.assert_allclose(came[2], expected[2], rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("changes", [{"evolution": SAFE}, {"algorithm": "ars"}])
+def test_safe_mutation_and_evolution_strategies_train_in_any_batch(changes: dict[str, Any], tmp_path: Path) -> None:
+    narrow, wide = (train(ant(tmp_path / str(worlds), worlds, **changes)).directory for worlds in (3, 64))
+    assert content(narrow) == content(wide)
 
 
 def test_room_for_contacts_is_doubled_once(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:

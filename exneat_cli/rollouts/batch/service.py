@@ -40,6 +40,10 @@ class _Request:
     given_up: bool = False
 
     @property
+    def moments(self) -> bool:
+        return bool(self.tally[-1].size)
+
+    @property
     def jobs(self) -> int:
         return len(self.brains.size) * len(self.episodes)
 
@@ -118,9 +122,9 @@ class Batches:
                 return False
             came, self._waiting = self._waiting, []
         for request in came:
-            key = pickle.dumps(request.setup)
+            key = pickle.dumps((request.setup, request.moments))
             if key not in self._batches:
-                self._batches[key] = _Batch(request.setup, self._device, self._most)
+                self._batches[key] = _Batch(request.setup, self._device, self._most, moments=request.moments)
             self._batches[key].requests.append(request)
         return True
 
@@ -128,8 +132,9 @@ class Batches:
 class _Batch:
     """The requests of one task and noise, and the worlds that they share."""
 
-    def __init__(self, setup: Setup, device: str, most: int) -> None:
+    def __init__(self, setup: Setup, device: str, most: int, *, moments: bool) -> None:
         self._setup, self._device, self._most, self._room = setup, device, most, 1
+        self._moments = moments
         self._stage: Stage | None = None
         self._worlds = self._slots = 0
         self._running: dict[int, _Request] = {}
@@ -181,7 +186,7 @@ class _Batch:
             self._worlds, self._device, training=training, reset_scale=noise.reset_scale, room=self._room
         )
         sizes = {"sensed_size": task.sensed_size, "action_size": len(task.actuator_names), "terms": len(task.terms)}
-        self._stage = Stage(opened, sensor_std=noise.sensor_std, slots=self._slots, **sizes)
+        self._stage = Stage(opened, sensor_std=noise.sensor_std, slots=self._slots, moments=self._moments, **sizes)
 
     def _double_room(self) -> None:
         if self._room > 1:

@@ -19,6 +19,7 @@ from exneat_cli.brains.brain import memory_size
 from exneat_cli.rollouts.batch import kernels
 from exneat_cli.rollouts.batch.kernels import IDLE, Doing, Jobs, Outcome
 from exneat_cli.rollouts.batch.mirrored import Mirrored, widened
+from exneat_cli.rollouts.batch.sensing import Sensing
 from exneat_cli.rollouts.episode import Tally
 from exneat_cli.seeding import EpisodeSeeds
 
@@ -31,13 +32,22 @@ class Stage:
         sensor_std: sd of the normal noise on every reading.
         slots: S.
         sensed_size, action_size, terms: of the task.
+        moments: whether statistics of what networks sense are wanted.
 
     Attributes:
         control_steps: how many were done, of all worlds at once.
     """
 
     def __init__(
-        self, worlds: Any, *, sensor_std: float, slots: int, sensed_size: int, action_size: int, terms: int
+        self,
+        worlds: Any,
+        *,
+        sensor_std: float,
+        slots: int,
+        sensed_size: int,
+        action_size: int,
+        terms: int,
+        moments: bool,
     ) -> None:
         self._worlds, self._sd, self._slots = worlds, sensor_std, slots
         self._sensed_size, self.control_steps = sensed_size, 0
@@ -64,6 +74,7 @@ class Stage:
             self._outcome = _struct(Outcome(), (slots, 1), int, "status", "steps")
             self._outcome.totals = wp.zeros((slots, 1, terms), dtype=wp.float64)
             self._outcome.ended = wp.zeros(slots, dtype=int)
+            self._sensing = Sensing(count, slots, sensed_size) if moments else None
             self._overflow = wp.zeros(1, dtype=int)
             worlds.status.fill_(IDLE)
             self._program()  # compiles and loads all kernels, which a capture must not
@@ -108,11 +119,14 @@ class Stage:
 
     def fetch(self, slot: int, tally: Tally) -> None:
         """Write what came of a slot whose episodes have all ended."""
-        statuses, steps, totals = tally[:3]
+        statuses, steps, totals, *moments = tally
         jobs, shape = statuses.size, statuses.shape
         statuses[:] = self._outcome.status[slot].numpy()[:jobs].reshape(shape)
         steps[:] = self._outcome.steps[slot].numpy()[:jobs].reshape(shape)
         totals[:] = self._outcome.totals[slot].numpy()[:jobs].reshape(*shape, -1)
+        if self._sensing is not None:
+            for wanted, came in zip(moments, self._sensing.of(slot), strict=True):
+                wanted[:] = came[:jobs].reshape(*shape, -1)
 
     def _program(self) -> None:
         worlds, doing, count = self._worlds, self._doing, self._worlds.count
@@ -128,10 +142,14 @@ class Stage:
                 kernels.disturb, dim=(count, -(-size // 4)), inputs=[self._keys.there, doing, self._sd, size, readings]
             )
         worlds.sense(readings, memory)
+        if self._sensing is not None:
+            self._sensing.add(doing, memory)
         wp.launch(activate, dim=count, inputs=[self._programs.there, doing.slot, doing.brain, memory, self._action])
         worlds.drive(self._action)
         worlds.step()
         wp.launch(kernels.keep_count, dim=count, inputs=[worlds.status, worlds.terms, doing, self._outcome])
+        if self._sensing is not None:
+            self._sensing.keep(worlds.status, doing)
         worlds.note_overflows(self._overflow)
 
     def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
@@ -150,6 +168,8 @@ class Stage:
             for name in ("status", "steps", "totals"):
                 array = getattr(self._outcome, name)
                 setattr(self._outcome, name, _grown(array, (slots, _ample(jobs), *array.shape[2:])))
+            if self._sensing is not None:
+                self._sensing.make_room(_ample(jobs))
             self._grow_queue(slots * _ample(jobs))
             self._graph = None
 
