@@ -18,8 +18,8 @@ from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import BUDGETS
 from exneat_cli.commands.report import study_of
-from exneat_cli.commands.shipped import shipped_directory
-from exneat_cli.commands.sweep import experiment_names, read_experiment, results_file
+from exneat_cli.commands.shipped import shipped_directory, shipped_files
+from exneat_cli.commands.sweep import read_experiment, results_file
 from exneat_cli.records import read_published
 
 HERE = Path(__file__).parent
@@ -32,7 +32,7 @@ SHOWN = ("training", "training_runs", "robustness", "cluster")
 def published_studies(nowhere: str) -> dict[str, Study]:
     """Experiments with published rows, each at the largest budget that has any; runs are looked for in `nowhere`."""
     studies = {}
-    for name in experiment_names():
+    for name in shipped_files("experiments"):
         rows = read_published(results_file(name))
         budget = next((budget for budget in BUDGETS if any(row.budget == budget for row in rows)), None)
         if budget is not None:
@@ -136,7 +136,7 @@ def write() -> None:
     loader = jinja2.FileSystemLoader(HERE)
     jinja = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     jinja.filters["markdown"] = as_markdown
-    missing = [name for name in experiment_names() if name not in studies]
+    missing = [name for name in shipped_files("experiments") if name not in studies]
     page = jinja.get_template("results.md.j2").render(sections=sections, missing=missing)
     (HERE / "results.md").write_text(page.rstrip() + "\n", encoding="utf-8")
 

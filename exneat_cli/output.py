@@ -32,7 +32,7 @@ def forgiving_output() -> Iterator[list[OSError]]:
             os.open(os.devnull, os.O_RDWR)
     before = sys.stdout, sys.stderr
     lost: list[OSError] = []
-    sys.stdout, sys.stderr = _forgiving(sys.stdout, 1, lost), _forgiving(sys.stderr, 2, [])
+    sys.stdout, sys.stderr = _forgiving(sys.stdout, lost), _forgiving(sys.stderr, [])
     try:
         yield lost
     finally:
@@ -41,7 +41,7 @@ def forgiving_output() -> Iterator[list[OSError]]:
         sys.stdout, sys.stderr = before
 
 
-def _forgiving(stream: TextIO | None, descriptor: int, lost: list[OSError]) -> TextIO:
+def _forgiving(stream: TextIO | None, lost: list[OSError]) -> TextIO:
     if stream is None:  # the descriptor was closed when Python began
         return open(os.devnull, "w", encoding="utf-8", errors="replace")
     try:

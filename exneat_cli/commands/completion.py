@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from exneat_cli.commands.shipped import section_of, shipped_directory, yaml_file
+from exneat_cli.commands.shipped import section_of, shipped_directory, shipped_files, yaml_file
 from exneat_cli.errors import check_choice
 
 SHELLS = ("bash", "zsh", "fish")
@@ -162,8 +162,7 @@ def _values(
     elif key == "output":
         yield from _paths(value, lambda path: path.is_dir())
     elif key == "experiment":
-        known = [path.stem for path in shipped_directory("experiments").glob("*.yaml") if path.stem != "catalogue"]
-        yield from _beginning(value, sorted(known))
+        yield from _beginning(value, list(shipped_files("experiments")))
         yield from _paths(value, lambda path: path.is_dir() or path.suffix in (".yaml", ".yml"))
     elif key == "only":
         yield from _beginning(value, list(_read(shipped_directory("experiments") / "catalogue.yaml")))

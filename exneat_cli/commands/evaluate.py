@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import Job, finished_runs, name_code, with_sweeps
+from exneat_cli.commands.jobs import Job, finished_runs, name_code_of_runs, with_sweeps
 from exneat_cli.commands.run_table import print_table
-from exneat_cli.errors import ConfigError, ExneatError, check_keys, check_section
+from exneat_cli.errors import ConfigError, ExneatError, check_section
 from exneat_cli.records import RunDirectory, build, read_robustness
 from exneat_cli.rollouts import Executor, is_compiled
 from exneat_cli.runs import load_settings, progress_for_terminal
@@ -18,8 +18,7 @@ def run(line: CommandLine) -> int:
         ExneatError: a run, a sweep or a level is unusable; nothing was run then.
     """
     plain = line.compose_only(("run", "task", "sweeps"), ("sweep", "executor"))
-    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
-    name_code(line, plain)
+    name_code_of_runs(line, plain)
     if not plain["sweeps"]:
         raise ConfigError("sweep", "what to perturb, e.g. sweep=sensor_noise", "none")
     where = check_section("executor", plain.get("executor", {}))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import finished_runs, name_code
-from exneat_cli.errors import ConfigError, check_choice, check_keys, check_path, check_section
+from exneat_cli.commands.jobs import finished_runs, name_code_of_runs
+from exneat_cli.errors import ConfigError, check_choice, check_path
 from exneat_cli.records.exports import FORMATS, export
 from exneat_cli.runs import load_champion, load_settings
 
@@ -16,8 +16,7 @@ def run(line: CommandLine) -> int:
         ExneatError: a run is unusable, or its champion does not fit the format; nothing was written then.
     """
     plain = line.compose_only(("run", "format", "output", "task"))
-    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
-    name_code(line, plain)
+    name_code_of_runs(line, plain)
     check_choice("format", plain["format"], list(FORMATS))
     form, runs = plain["format"], finished_runs(plain["run"])
     output = plain["output"]

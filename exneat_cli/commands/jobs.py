@@ -139,6 +139,12 @@ def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
     NAMED.update(reference for key, reference in code.items() if line.names(key))
 
 
+def name_code_of_runs(line: CommandLine, plain: Mapping[str, Any]) -> None:
+    """See `name_code`, for a command that takes the rest of a task from the runs themselves."""
+    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
+    name_code(line, plain)
+
+
 def finished_runs(pattern: object) -> list[RunDirectory]:
     """The run directories that ``run=`` names.
 

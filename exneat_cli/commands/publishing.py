@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,34 +10,28 @@ from exneat_cli.commands.jobs import BUDGETS, Job
 from exneat_cli.records import PublishedRun, publish, published_run
 
 
-@dataclass(frozen=True)
-class Publisher:
-    """Writes rows of jobs called ``<condition>/<variant>/<seed>`` into one file, from several processes if need be."""
+def publish_jobs(
+    path: Path, budget: str, conditions: Sequence[str], variants: Sequence[str], jobs: Sequence[Job]
+) -> None:
+    """Write the rows of finished jobs, called ``<condition>/<variant>/<seed>``; rows that are there stay as they are.
 
-    path: Path
-    budget: str
-    conditions: tuple[str, ...]
-    variants: tuple[str, ...]
+    Several processes may do so at once.
 
-    def publish(self, jobs: Sequence[Job]) -> None:
-        """Write the rows of finished jobs; those that are there already stay as they are.
+    Raises:
+        ExneatError: the file is damaged, or cannot be written.
+    """
 
-        Raises:
-            ExneatError: the file is damaged, or cannot be written.
-        """
-        if jobs:
-            publish(self.path, list(map(self._row, jobs)), self._order)
+    def order(row: PublishedRun) -> tuple[Any, ...]:
+        return (*_places((row.budget, BUDGETS), (row.condition, conditions), (row.variant, variants)), row.seed)
 
-    def _row(self, job: Job) -> PublishedRun:
-        condition, variant, _ = job.name.split("/")
-        levels = {(sweep.name, float(level)) for sweep in job.sweeps for level in sweep.levels}
-        return published_run(job.settings.directory, (condition, variant, self.budget), levels, job.episodes)
+    if jobs:
+        publish(path, [_row(job, budget) for job in jobs], order)
 
-    def _order(self, row: PublishedRun) -> tuple[Any, ...]:
-        return (
-            *_places((row.budget, BUDGETS), (row.condition, self.conditions), (row.variant, self.variants)),
-            row.seed,
-        )
+
+def _row(job: Job, budget: str) -> PublishedRun:
+    condition, variant, _ = job.name.split("/")
+    levels = {(sweep.name, float(level)) for sweep in job.sweeps for level in sweep.levels}
+    return published_run(job.settings.directory, (condition, variant, budget), levels, job.episodes)
 
 
 def _places(*named: tuple[str, Sequence[str]]) -> Iterable[tuple[int, str]]:

@@ -19,8 +19,8 @@ from exneat_cli.analysis.tables import build_comparison, build_table
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.inspect import tell_unreadable
 from exneat_cli.commands.jobs import BUDGETS, Job
-from exneat_cli.commands.shipped import shipped_directory
-from exneat_cli.commands.sweep import Experiment, experiment_names, plan_jobs, read_experiment, results_file
+from exneat_cli.commands.shipped import shipped_directory, shipped_files
+from exneat_cli.commands.sweep import Experiment, plan_jobs, read_experiment, results_file
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
 from exneat_cli.records import PublishedRun, find_runs, read_published, runs_at
 from exneat_cli.tasks import HasFullReward
@@ -97,7 +97,7 @@ def _artefacts(asked: Mapping[str, Any], own: Experiment | None) -> dict[str, Fi
     """What is to be built: from the catalogue, or, for an experiment that is not in it, one figure for each thing."""
     catalogue = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
     if own:
-        shipped = asked["experiment"] in experiment_names()
+        shipped = asked["experiment"] in shipped_files("experiments")
         known = {name: each for name, each in catalogue.items() if shipped and own.name in _experiments_of(each)}
         catalogue = known or _figures_for(own)
     if asked["only"] is None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from exneat_cli.commands.command_line import CommandLine
-from exneat_cli.commands.jobs import name_code, with_sweeps
+from exneat_cli.commands.jobs import name_code_of_runs, with_sweeps
 from exneat_cli.commands.train import tell
-from exneat_cli.errors import ExneatError, check_keys, check_path, check_section
+from exneat_cli.errors import ExneatError, check_path
 from exneat_cli.records import RunDirectory, build
 from exneat_cli.rollouts import Executor
 from exneat_cli.runs import progress_for_terminal, read_settings
@@ -20,8 +20,7 @@ def run(line: CommandLine) -> int:
         ExneatError: there is no such run, its settings cannot be read, or a setting makes no sense.
     """
     plain = line.compose_only(("run", "generations", "tracker", "task", "sweeps"), ("sweep", "executor"))
-    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
-    name_code(line, plain)
+    name_code_of_runs(line, plain)
     directory = RunDirectory(check_path("run", plain["run"], "a run directory"))
     settings = read_settings(directory)
     path = directory.path.absolute()

@@ -20,8 +20,8 @@ import msgspec
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import Job, read_job
 from exneat_cli.commands.setting import as_written, read_setting
-from exneat_cli.commands.shipped import shipped_directory
-from exneat_cli.errors import ConfigError, ExneatError, check_path, check_text, check_whole
+from exneat_cli.commands.shipped import chosen_file
+from exneat_cli.errors import ExneatError, check_whole
 from exneat_cli.records import RunDirectory, converted, make_directory, read_yaml
 from exneat_cli.runs import Progress, train
 
@@ -85,13 +85,7 @@ def run(line: CommandLine) -> int:
 
 
 def _read_space(name: object) -> tuple[Path, Space]:
-    folder = shipped_directory("experiments") / "searches"
-    known = sorted(path.stem for path in folder.glob("*.yaml"))
-    check_text("space", name, f"one of {', '.join(known)}, or a .yaml file")
-    own = str(name).endswith((".yaml", ".yml"))
-    if not own and name not in known:
-        raise ConfigError("space", f"one of {', '.join(known)}, or a .yaml file", name)
-    path = check_path("space", name) if own else folder / f"{name}.yaml"
+    path = chosen_file("space", name, "experiments/searches")
     space = converted(read_yaml(path), Space, f"{path}")
     if not space.space:
         raise ExneatError(f"{path}: space: expected at least one setting to search, got none")

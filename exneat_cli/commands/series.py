@@ -5,15 +5,17 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import Job
 from exneat_cli.commands.launching import run_jobs, side_by_side
-from exneat_cli.commands.publishing import Publisher
 from exneat_cli.compiling import seconds_compiled
 from exneat_cli.runs import Progress, progress_for_terminal
+
+Publish = Callable[[Sequence[Job]], None]
+"""Writes rows of finished jobs; picklable, for a launcher's workers."""
 
 
 def unfinished(jobs: Sequence[Job]) -> list[Job]:
@@ -22,9 +24,9 @@ def unfinished(jobs: Sequence[Job]) -> list[Job]:
 
 
 def do_jobs(
-    jobs: Sequence[Job], pending: Sequence[Job], line: CommandLine, publisher: Publisher | None = None
+    jobs: Sequence[Job], pending: Sequence[Job], line: CommandLine, publish: Publish | None = None
 ) -> list[str]:
-    """Do the `pending` ones of `jobs`, each published when done if there is a `publisher`.
+    """Do the `pending` ones of `jobs`, and `publish` each when it is done.
 
     Returns why each of them failed, empty where it did not.
 
@@ -34,7 +36,7 @@ def do_jobs(
     if not pending:
         return []
     alone = not line.launcher and not side_by_side(pending)
-    series = _Series([job.name for job in jobs], list(jobs), len(pending), time.time(), line.words, alone, publisher)
+    series = _Series([job.name for job in jobs], list(jobs), len(pending), time.time(), line.words, alone, publish)
     with contextlib.nullcontext() if alone else series.told():
         return run_jobs(series.do, pending, line)
 
@@ -49,7 +51,7 @@ class _Series:
     began: float
     words: tuple[str, ...]  # typed, for manifests
     alone: bool  # whether each tells what it is doing
-    publisher: Publisher | None
+    publish: Publish | None
 
     @contextlib.contextmanager
     def told(self) -> Iterator[None]:
@@ -71,8 +73,8 @@ class _Series:
         counted = f"[{1 + self.names.index(job.name):>{len(str(count))}}/{count}] {job.name}"
         print(f"{counted} begins", flush=True)
         finished = job.do(progress_for_terminal(tenths=False) if self.alone else Progress(), self.words, go_on=True)
-        if self.publisher:
-            self.publisher.publish([job])
+        if self.publish:
+            self.publish([job])
         done = self._count_done()
         left = count - done
         seconds = (time.time() - self.began - seconds_compiled()) / max(1, self.pending - left) * left

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import exneat_cli
+from exneat_cli.errors import ConfigError, check_path
 
 
 def shipped_directory(name: str) -> Path:
@@ -13,6 +14,26 @@ def shipped_directory(name: str) -> Path:
     package = Path(exneat_cli.__file__).parent
     packaged = package / name
     return packaged if packaged.is_dir() else package.parent / name
+
+
+def shipped_files(folder: str) -> dict[str, Path]:
+    """The YAML files in a folder of data, by name; the catalogue of figures is none of the experiments."""
+    return {path.stem: path for path in sorted(shipped_directory(folder).glob("*.yaml")) if path.stem != "catalogue"}
+
+
+def chosen_file(key: str, name: object, folder: str) -> Path:
+    """The YAML file that a setting names: one of `shipped_files`, or by its path one of the user's own.
+
+    Raises:
+        ConfigError: there is no file of that name.
+    """
+    known = shipped_files(folder)
+    expected = f"one of {', '.join(known)}, or a .yaml file"
+    if isinstance(name, str) and name.endswith((".yaml", ".yml")):
+        return check_path(key, name, expected)
+    if not isinstance(name, str) or name not in known:
+        raise ConfigError(key, expected, name)
+    return known[name]
 
 
 def yaml_file(folders: Iterable[Path], name: str) -> Path | None:

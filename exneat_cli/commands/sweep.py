@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,18 +18,17 @@ from omegaconf.errors import OmegaConfBaseException
 
 from exneat_cli.commands.command_line import CommandLine, in_words
 from exneat_cli.commands.jobs import BUDGETS, Job, check_known, read_job
-from exneat_cli.commands.publishing import Publisher
+from exneat_cli.commands.publishing import publish_jobs
 from exneat_cli.commands.run_table import print_table
 from exneat_cli.commands.series import do_jobs, unfinished
 from exneat_cli.commands.setting import as_written, read_setting
-from exneat_cli.commands.shipped import shipped_directory
+from exneat_cli.commands.shipped import chosen_file
 from exneat_cli.errors import (
     ConfigError,
     ExneatError,
     check_choice,
     check_flag,
     check_keys,
-    check_path,
     check_section,
     check_text,
     check_whole,
@@ -80,28 +80,19 @@ class Experiment:
     runs: Mapping[str, int]
 
 
-def experiment_names() -> list[str]:
-    """Names of the experiments that come with exneat."""
-    return sorted(path.stem for path in shipped_directory("experiments").glob("*.yaml") if path.stem != "catalogue")
-
-
 def results_file(name: str) -> Path:
     """Where the published rows of an experiment are: ``results/<name>.csv`` beside its YAML file."""
-    own = name.endswith((".yaml", ".yml"))
-    path = check_path("experiment", name) if own else shipped_directory("experiments") / f"{name}.yaml"
+    path = chosen_file("experiment", name, "experiments")
     return path.parent / "results" / f"{path.stem}.csv"
 
 
 def read_experiment(name: object) -> Experiment:
-    """Read one of `experiment_names`, or a YAML file of the user's own.
+    """Read one of exneat's experiments, or a YAML file of the user's own.
 
     Raises:
         ExneatError: there is no such experiment, or its file is damaged or makes no sense.
     """
-    own = isinstance(name, str) and name.endswith((".yaml", ".yml"))
-    if not own and name not in experiment_names():
-        raise ConfigError("experiment", f"one of {', '.join(experiment_names())}, or a .yaml file", name)
-    path = check_path("experiment", name) if own else shipped_directory("experiments") / f"{name}.yaml"
+    path = chosen_file("experiment", name, "experiments")
     try:
         content: Any = OmegaConf.to_container(OmegaConf.load(path))
     except OSError as error:
@@ -226,11 +217,11 @@ def run(line: CommandLine) -> int:
     check_flag("publish", asked["publish"])
     experiment = read_experiment(asked["experiment"])
     jobs = plan_jobs(experiment, asked["budget"], line, ("experiment", "publish"))
-    publisher = None
+    publishing = None
     if asked["publish"]:
         file, names = results_file(asked["experiment"]), (tuple(experiment.conditions), tuple(experiment.variants))
-        publisher = Publisher(file, asked["budget"], *names)
-        publisher.publish([job for job in jobs if job.is_finished()])
+        publishing = partial(publish_jobs, file, asked["budget"], *names)
+        publishing([job for job in jobs if job.is_finished()])
     pending = unfinished(jobs)
     for job in pending:
         check_worlds(job.settings.task)
@@ -239,7 +230,7 @@ def run(line: CommandLine) -> int:
     print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
     reasons = [""] * len(pending)
     try:
-        reasons = do_jobs(jobs, pending, line, publisher)
+        reasons = do_jobs(jobs, pending, line, publishing)
     except ExneatError as error:
         if signal_heard() is not None or not any(job.is_finished() for job in pending):
             raise

@@ -8,7 +8,8 @@ import pytest
 import yaml
 
 from exneat_cli.commands.command_line import read_command_line
-from exneat_cli.commands.sweep import experiment_names, plan_jobs, read_experiment, results_file
+from exneat_cli.commands.shipped import shipped_files
+from exneat_cli.commands.sweep import plan_jobs, read_experiment, results_file
 from exneat_cli.main import main
 from exneat_cli.records import PublishedRun, provenance, published_run, read_published
 from exneat_cli.runs import Progress
@@ -86,7 +87,7 @@ def test_a_published_run_gives_the_same_row_again(tmp_path: Path) -> None:
     assert again._replace(**dict.fromkeys(ANEW)) == row._replace(**dict.fromkeys(ANEW), processor=again.processor)
 
 
-@pytest.mark.parametrize("name", experiment_names())
+@pytest.mark.parametrize("name", shipped_files("experiments"))
 def test_published_rows_are_few_bytes_and_no_run_is_there_twice(name: str) -> None:
     path = results_file(name)
     rows = read_published(path)

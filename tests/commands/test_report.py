@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
-from exneat_cli.commands.shipped import shipped_directory
-from exneat_cli.commands.sweep import Experiment, experiment_names, read_experiment
+from exneat_cli.commands.shipped import shipped_directory, shipped_files
+from exneat_cli.commands.sweep import Experiment, read_experiment
 from exneat_cli.main import main
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
@@ -34,7 +34,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             patch.setattr(f"exneat_cli.commands.{module}.read_experiment", shortened)
         with pytest.MonkeyPatch.context() as meanwhile:  # the figures of single runs are not looked at here, and slow
             meanwhile.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
-            for name in experiment_names():
+            for name in shipped_files("experiments"):
                 assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
         yield output
 
@@ -137,7 +137,7 @@ def test_an_experiment_of_the_users_own_gets_figures_and_a_comparison(tmp_path: 
 
 
 def test_every_condition_and_variant_of_the_catalogue_is_one_of_its_experiment() -> None:
-    experiments = {name: read_experiment(name) for name in experiment_names()}
+    experiments = {name: read_experiment(name) for name in shipped_files("experiments")}
     for artefact in CATALOGUE.values():
         for part in getattr(artefact, "panels", ()) or getattr(artefact, "rows", ()):
             experiment = experiments[part.experiment]

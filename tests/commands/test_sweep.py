@@ -12,7 +12,8 @@ import yaml
 
 from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.jobs import Job
-from exneat_cli.commands.sweep import experiment_names, plan_jobs, read_experiment
+from exneat_cli.commands.shipped import shipped_files
+from exneat_cli.commands.sweep import plan_jobs, read_experiment
 from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, read_robustness
@@ -126,14 +127,14 @@ def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None
     assert sorted({job.settings.seed for job in jobs}) == [7, 8]
 
 
-@pytest.mark.parametrize("name", experiment_names())
+@pytest.mark.parametrize("name", shipped_files("experiments"))
 def test_no_two_jobs_of_an_experiment_share_a_directory(name: str, tmp_path: Path) -> None:
     jobs = plan(tmp_path, name=name, budget="paper")  # smaller budgets have the same jobs, with fewer seeds
     assert len({job.settings.directory.path for job in jobs}) == len(jobs) == len({job.name for job in jobs})
 
 
 def test_experiments_have_ten_runs_on_paper_and_three_when_quick() -> None:
-    for name in experiment_names():
+    for name in shipped_files("experiments"):
         assert read_experiment(name).runs == {"paper": 10, "quick": 3, "smoke": 1}
 
 
