@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from exneat_cli.records.plain import dotted
+
 NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
 """Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
 
@@ -24,14 +26,7 @@ def identity(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """The settings that are hashed, by dotted key, with 1.0 written as 1: a number is the same however it was typed."""
     kept = {key: value for key, value in configuration.items() if key not in NOT_HASHED}
     text = json.dumps(kept, allow_nan=False, default=str)
-    flat: dict[str, Any] = json.loads(text, object_pairs_hook=_flat, parse_float=_shortest)
-    return flat
-
-
-def _flat(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in pairs:
-        flat |= {f"{key}.{inner}": v for inner, v in value.items()} if isinstance(value, dict) else {key: value}
+    flat: dict[str, Any] = json.loads(text, object_pairs_hook=lambda pairs: dotted(dict(pairs)), parse_float=_shortest)
     return flat
 
 

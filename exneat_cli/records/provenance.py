@@ -12,6 +12,7 @@ from pathlib import Path
 
 import exneat_cli
 
+_version = functools.cache(version)  # which reads a file
 _PACKAGES = ("neat-python", "numpy", "numba", "gymnasium", "mujoco", "hydra-core")
 
 
@@ -19,11 +20,6 @@ def versions() -> dict[str, str]:
     """Versions of exneat, Python and the libraries that results depend on."""
     packages = {package: _version(package) for package in _PACKAGES}
     return {"exneat": exneat_cli.__version__, "python": platform.python_version(), **packages}
-
-
-@functools.cache
-def _version(package: str) -> str:
-    return version(package)  # which reads a file
 
 
 def processor() -> str:

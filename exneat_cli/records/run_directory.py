@@ -8,9 +8,8 @@ import fcntl
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from exneat_cli.records.manifest import (
 from exneat_cli.records.plain import read_json, read_yaml
 
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
-_ABSENT = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG)
+ABSENT = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG)
 """Errors that say that nothing is there; by others nobody can tell."""
 _TRIES, _PAUSE = 3, 0.02
 """How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
@@ -140,21 +139,23 @@ class RunDirectory:
 
     def _difference(self, configuration: Mapping[str, Any]) -> str:
         """What the run that is there has otherwise, in words."""
-        try:
-            there = identity(read_yaml(self.config))
-        except (ExneatError, TypeError, ValueError):
+        there, here = self._identity(), identity(configuration)
+        if there is None:
             return "its config.yaml cannot be read"
-        here = identity(configuration)
         keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
         named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
         return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
 
     def is_alike(self, configuration: Mapping[str, Any]) -> bool:
         """Whether the run has these settings, word for word."""
+        return self._identity() == identity(configuration)
+
+    def _identity(self) -> dict[str, Any] | None:
+        """The settings in config.yaml that results depend on; None where they cannot be read."""
         try:
-            return identity(read_yaml(self.config)) == identity(configuration)
+            return identity(read_yaml(self.config))
         except (ExneatError, TypeError, ValueError):
-            return False
+            return None
 
     def begin(self, config: str, manifest: Manifest, files: Mapping[str, bytes]) -> None:
         """Write the first files, the manifest before all; if that fails, a directory that was new is gone again.
@@ -203,7 +204,7 @@ class RunDirectory:
         try:
             os.stat(self.manifest)
         except OSError as error:
-            if error.errno not in _ABSENT:
+            if error.errno not in ABSENT:
                 raise ExneatError(f"{self.path}: cannot be read: {error.strerror}") from error
             return False
         return True
@@ -252,49 +253,6 @@ class RunDirectory:
             ExneatError: it cannot be read or written.
         """
         write_json(self.manifest, msgspec.structs.replace(self.read_manifest(), **changes))
-
-
-def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None) -> list[RunDirectory]:
-    """Every run below an output root, or in one of its folders, or the run that it is; in alphabetical order.
-
-    `unreadable` is told of each folder that cannot be read; what is not there has no runs.
-    """
-
-    def tell(error: OSError) -> None:
-        if unreadable and error.errno not in _ABSENT:
-            unreadable(error)
-
-    found: list[tuple[int, Path]] = []
-    for place, folders, files in os.walk(output, onerror=tell, followlinks=True):
-        path = Path(place)
-        depth = len(path.relative_to(output).parts)
-        folders[:] = [name for name in folders if depth < 2 and not name.startswith(".")]
-        if "manifest.json" in files:
-            found.append((depth, path))
-    return [RunDirectory(path) for _, path in sorted(found)]
-
-
-def runs_at(pattern: Path) -> list[RunDirectory]:
-    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it.
-
-    Raises:
-        ExneatError: a folder where runs may be cannot be read.
-    """
-    found = [Path()]
-    for part in pattern.parts:
-        literal = [path / part for path in found if os.path.lexists(path / part)]
-        found = literal or [path / each for path in found for each in _fitting(path, part)]
-    return [run for path in found if (run := RunDirectory(path)).is_there()]
-
-
-def _fitting(folder: Path, part: str) -> list[str]:
-    try:
-        os.scandir(folder).close()  # of whose errors `glob` makes nothing
-    except OSError as error:
-        if error.errno in _ABSENT:
-            return []
-        raise ExneatError(f"{folder}: cannot be read: {error.strerror}") from error
-    return sorted(glob(part, root_dir=folder))
 
 
 def _lock(directory: Path, descriptor: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import tempfile
 from collections.abc import Generator
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.records.files import delete, make_directory
+from exneat_cli.records.files import make_directory, replacing
 
 _PALETTE = "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
 VIDEO_FORMATS: dict[str, list[str]] = {
@@ -52,20 +51,13 @@ def write_video(path: Path, frames: Generator[NDArray[np.uint8]], fps: float, fo
     """
     program = _ffmpeg()
     make_directory(path.parent)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        temporary.touch()  # refused before anything is drawn
-        with closing(frames):
-            count = _encode(program, frames, fps, form, temporary)
-        temporary.replace(path)
-    except OSError as error:
-        raise ExneatError(f"{path}: could not be written: {error.strerror}; check the disk and output=") from error
+        with replacing(path) as temporary, closing(frames):
+            temporary.touch()  # refused before anything is drawn
+            return _encode(program, frames, fps, form, temporary)
     except _EncodingError as error:
         fix = "check the disk, or pip install --force-reinstall imageio-ffmpeg"
         raise ExneatError(f"{path}: could not be written: ffmpeg says: {error}\n  {fix}") from error
-    finally:
-        delete(temporary)
-    return count
 
 
 class _EncodingError(Exception):
