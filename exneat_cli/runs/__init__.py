@@ -10,7 +10,6 @@ from exneat_cli.runs.robustness import (
     run_robustness,
 )
 from exneat_cli.runs.run import Finished, train
-from exneat_cli.runs.scores import summary_sentence
 from exneat_cli.runs.settings import RunSettings, read_task
 from exneat_cli.runs.trackers import tracked
 from exneat_cli.runs.watching import Scene, record_champion

@@ -14,8 +14,6 @@ from exneat_cli.seeding import EpisodeSeeds
 FIRST_ROUND = 2
 """Episodes of every team in the first round of a race."""
 
-_FIGURES: Any = ("fitness", "full_reward", "steps", "failed")
-
 
 def race(
     runner: Runner, brains: Sequence[Brains], episodes: Sequence[EpisodeSeeds], first: int = FIRST_ROUND
@@ -37,9 +35,9 @@ def race(
     got: list[list[Outcomes]] = [[] for _ in brains]
     running, done, to = list(range(len(brains))), 0, min(first, len(episodes))
     while True:
-        outcomes = runner.run([brains[k] for k in running], episodes[done:to])
+        outcomes: Any = runner.run([brains[k] for k in running], episodes[done:to])
         for row, k in enumerate(running):
-            got[k].append(Outcomes(*(getattr(outcomes, name)[row : row + 1] for name in _FIGURES)))
+            got[k].append(Outcomes(*(figures[row : row + 1] for figures in outcomes[:4])))
         running.sort(key=lambda k: (-float(_joined(got[k]).fitness.mean()), k))
         if to == len(episodes):
             break
@@ -50,5 +48,5 @@ def race(
 
 def _joined(parts: Sequence[Outcomes]) -> Outcomes:
     """All episodes of one brain."""
-    figures: Any = [np.concatenate([getattr(each, name) for each in parts], axis=1) for name in _FIGURES]
+    figures: Any = [np.concatenate(each, axis=1) for each in zip(*(part[:4] for part in parts), strict=True)]
     return Outcomes(*figures)

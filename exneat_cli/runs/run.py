@@ -77,25 +77,29 @@ def train(
                 _recorded(directory, settings, progress, command),
                 contextlib.nullcontext(tracking) if tracking else tracked(settings.trackers) as told,
             ):
-                if settings.algorithm.rule:
-                    told.begin(directory, settings.to_plain(), ())
-                    result = measure_baseline(settings, directory)
-                else:
-                    checkpoints = read_checkpoints(directory.path, settings.full_hash)
-                    training = Training.resumed(settings, checkpoints, progress.say)
-                    told.begin(directory, settings.to_plain(), training.history)
-                    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
-                        while not training.is_over:
-                            training.advance(runner)
-                            _save(directory, training)
-                            progress.generation(training.history[-1])
-                            told.generation(training.history[-1])
-                    result = choose_champion(training, directory, progress)
+                result = _do(settings, directory, progress, told)
                 directory.update_manifest(status=DONE, finished=_now(), result=result)
                 told.result(result)
         result = directory.read_result()
     summary = summary_sentence(settings.task, result) + _told_of_backend(settings, result)
     return Finished(directory, result, summary, trained_now=not was_done)
+
+
+def _do(settings: RunSettings, directory: RunDirectory, progress: Progress, told: Tracking) -> Result:
+    """Train and choose the champion, or test the baseline."""
+    if settings.algorithm.rule:
+        told.begin(directory, settings.to_plain(), ())
+        return measure_baseline(settings, directory)
+    checkpoints = read_checkpoints(directory.path, settings.full_hash)
+    training = Training.resumed(settings, checkpoints, progress.say)
+    told.begin(directory, settings.to_plain(), training.history)
+    with Runner(settings.task, settings.noise, settings.executor, training=True) as runner:
+        while not training.is_over:
+            training.advance(runner)
+            _save(directory, training)
+            progress.generation(training.history[-1])
+            told.generation(training.history[-1])
+    return choose_champion(training, directory, progress)
 
 
 def _told_of_backend(settings: RunSettings, result: Result) -> str:
