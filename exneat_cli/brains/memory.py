@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from exneat_cli.algorithms import ArrayGenome
-from exneat_cli.brains.assembly import _express, wiring_tables
+from exneat_cli.brains.assembly import _express, _give_slots, _room, wiring_tables
 from exneat_cli.wiring import Plan
 
 Place = tuple[int, int]
@@ -19,7 +19,8 @@ def places_in_memory(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward
 
     A delayed pin of a recurrent brain has the slot that it reads: what it read is there before the step.
     """
-    networks, subpopulation, pins, _ = wiring_tables(plan)
+    wiring = wiring_tables(plan)
+    networks, subpopulation, pins, _ = wiring
     slots, found = [], []
     for genome, network in zip(genomes, networks, strict=True):
         order, slot_of = np.zeros((2, len(genome.nodes)), np.int64)
@@ -29,15 +30,8 @@ def places_in_memory(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward
         found.append(
             {int(genome.nodes[row]["key"]): int(slot_of[row] - network["inputs"]) for row in order[:evaluated]}
         )
-    base = plan.observation_size + np.cumsum([0] + [slots[s] for s in subpopulation])
-    places = {(m, key): int(base[m] + k) for m, s in enumerate(subpopulation) for key, k in found[s].items()}
-    end, p = int(base[-1]), 0
-    for m, module in enumerate(plan.modules):
-        for k in range(len(module.pins)):
-            pin = pins[p]
-            slot = int(pin["index"] + (base[pin["module"]] if pin["module"] >= 0 else 0))
-            if feed_forward and pin["delayed"]:
-                slot, end = end, end + 1  # a copy, made at the step's start
-            places[m, -1 - k] = slot
-            p += 1
-    return places
+    base, pin_slot = np.zeros(len(subpopulation) + 1, np.int64), np.zeros(len(pins), np.int64)
+    _give_slots(wiring, 0, np.array(slots), feed_forward, base, pin_slot, _room(plan, 1, 0, 0, len(pins)))
+    nodes = {(m, key): int(base[m] + k) for m, s in enumerate(subpopulation) for key, k in found[s].items()}
+    inputs = [(m, -1 - k) for m, module in enumerate(plan.modules) for k in range(len(module.pins))]
+    return nodes | dict(zip(inputs, pin_slot.tolist(), strict=True))
