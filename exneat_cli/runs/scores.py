@@ -172,9 +172,10 @@ def summary_sentence(task: Task, result: Result) -> str:
 
 def _way(task: Task, score: Score) -> str:
     """How far it went, where the task tells, e.g. ``walks 31 m in 50 s (0.62 m/s), forward in 20 of 20, and ``."""
-    if not isinstance(task, HasDistance) or score.steps_mean is None:
+    period = task.step_seconds
+    if not isinstance(task, HasDistance) or score.steps_mean is None or period is None:
         return ""
-    metres, seconds = task.metres_of(score.fitness_mean), task.seconds_of(score.steps_mean)
+    metres, seconds = task.metres_of(score.fitness_mean), score.steps_mean * period
     forward = f"forward in {_moving_forward(score)} of {score.episodes}"
     return f"went {metres:.1f} m in {seconds:.0f} s ({metres / seconds:.2f} m/s), {forward}, and "
 

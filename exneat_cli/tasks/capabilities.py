@@ -44,9 +44,6 @@ class HasDistance(Protocol):
     def metres_of(self, fitness: float) -> float:
         """Distance travelled forward (m)."""
 
-    def seconds_of(self, steps: float) -> float:
-        """What so many control steps take (s)."""
-
 
 @runtime_checkable
 class HasAdapter(Protocol):

@@ -32,8 +32,6 @@ from exneat_cli.tasks.task import Simulation
 
 LEAST_CUE, MOST_CUE = 0.1, 0.5
 """Ends of the ramp, from the tile beside the start to the goal."""
-
-
 LEADING = ("random", "second")
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
 """What `task.fitness` may be -> weight of time in the fitness; progress has the rest."""

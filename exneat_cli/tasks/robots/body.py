@@ -129,7 +129,8 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
     found = []
     for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
         joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and j not in driven]
-        if _is_free(model, joints) or _is_planar(model, body, joints):
+        is_free = [int(model.jnt_type[j]) for j in joints] == [int(mujoco.mjtJoint.mjJNT_FREE)]
+        if is_free or _is_planar(model, body, joints):
             bodies = subtree(model, body)
             found.append((sum(model.jnt_bodyid[j] in bodies for j in driven), body, tuple(joints)))
     if not found or max(found)[0] == 0:
@@ -137,10 +138,6 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
         raise ConfigError("task.model", "a body that moves freely or in a plane and has actuators", "none", fix)
     _, trunk, root = max(found, key=lambda each: each[0])
     return trunk, root
-
-
-def _is_free(model: mujoco.MjModel, joints: Sequence[int]) -> bool:
-    return [int(model.jnt_type[j]) for j in joints] == [int(mujoco.mjtJoint.mjJNT_FREE)]
 
 
 def _is_planar(model: mujoco.MjModel, body: int, joints: Sequence[int]) -> bool:

@@ -86,12 +86,8 @@ def sense_in_frames(frames: Frames, readings: NDArray[np.float64], sensed: NDArr
 @compiled
 def _write_rotation(frames, readings, rotation):  # type: ignore[no-untyped-def]
     if frames.free:
-        w, x, y, z = (
-            readings[frames.orientation + 0],
-            readings[frames.orientation + 1],
-            readings[frames.orientation + 2],
-            readings[frames.orientation + 3],
-        )
+        o = frames.orientation
+        w, x, y, z = readings[o], readings[o + 1], readings[o + 2], readings[o + 3]
         length = np.sqrt(w * w + x * x + y * y + z * z)  # noise takes it away from 1
         if length == 0.0:
             w, length = 1.0, 1.0

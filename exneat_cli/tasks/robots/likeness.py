@@ -22,11 +22,11 @@ its knees has a spring of 1 N m/rad, the other none, beside hips of 20."""
 _ROUND_OFF = 1e-6
 """Relative tolerance of what must be equal: ranges, gears, sizes, friction."""
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-_SPHERE, _ROUND = (
-    int(mujoco.mjtGeom.mjGEOM_SPHERE),
-    (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)),
-)
-_SHAPED_AXES = {_SPHERE: [], **{kind: [2] for kind in _ROUND}}
+_SHAPED_AXES: dict[int, list[int]] = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): [],
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): [2],
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): [2],
+}
 """Which of a geom's axes its shape shows; all three for shapes not named here."""
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Exchanges left and right."""

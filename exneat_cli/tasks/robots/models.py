@@ -6,12 +6,11 @@ Rules of names are those of Gymnasium's v5 environments (Farama Foundation, 2024
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import functools
 import hashlib
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
@@ -60,17 +59,13 @@ class Rules:
 _ALWAYS = (float("-inf"), float("inf"))
 _PLANAR = Rules(heights=_ALWAYS, speed="slide", normal=False, contact_weight=0.0)
 
-
-def _planar(**different: object) -> Rules:
-    return dataclasses.replace(_PLANAR, **different)  # type: ignore[arg-type]
-
-
 NAMED: dict[str, tuple[str, Rules]] = {
     "ant": ("ant.xml", Rules(heights=(0.2, 1.0), named_by_place=True)),
-    "half_cheetah": ("half_cheetah.xml", _planar(normal=True, healthy_reward=0.0, control_weight=0.1)),
+    "half_cheetah": ("half_cheetah.xml", replace(_PLANAR, normal=True, healthy_reward=0.0, control_weight=0.1)),
     "hopper": (
         "hopper.xml",
-        _planar(
+        replace(
+            _PLANAR,
             control_period=0.008,
             heights=(0.7, float("inf")),
             steepest=0.2,
@@ -81,9 +76,9 @@ NAMED: dict[str, tuple[str, Rules]] = {
     ),
     "walker2d": (
         "walker2d_v5.xml",
-        _planar(control_period=0.008, heights=(0.8, 2.0), steepest=1.0, reset_scale=5e-3, control_weight=1e-3),
+        replace(_PLANAR, control_period=0.008, heights=(0.8, 2.0), steepest=1.0, reset_scale=5e-3, control_weight=1e-3),
     ),
-    "swimmer": ("swimmer.xml", _planar(control_period=0.04, healthy_reward=0.0, control_weight=1e-4)),
+    "swimmer": ("swimmer.xml", replace(_PLANAR, control_period=0.04, healthy_reward=0.0, control_weight=1e-4)),
     "humanoid": (
         "humanoid.xml",
         Rules(

@@ -9,34 +9,28 @@ adds the healthy reward and subtracts the costs of effort and contact.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_text, check_whole
 from exneat_cli.tasks.robots import dynamics
-from exneat_cli.tasks.robots.body import SYMMETRIES, Body, check_parts, take_apart
-from exneat_cli.tasks.robots.models import NAMED, digest_of, files_of, load, rules_of
-from exneat_cli.tasks.robots.readings import Readings, actuator_names, body_name, joint_name, read_off, with_unit
-from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
+from exneat_cli.tasks.robots.body import SYMMETRIES, check_parts
+from exneat_cli.tasks.robots.models import NAMED, Rules, digest_of, files_of, load, rules_of
+from exneat_cli.tasks.robots.opening import Anatomy, anatomy_of, control_range, open_world
+from exneat_cli.tasks.robots.readings import actuator_names, body_name, joint_name, with_unit
 from exneat_cli.tasks.task import Adapter, Camera, Part, Simulation, Task, setting
 
 REWARDS = ("thesis", "gymnasium")
 THESIS_CONTROL_WEIGHT = 0.01
 """Weight of sum(control^2) under ``reward=thesis``: its full reward is about 900 above its forward reward over 1000
 steps, which leaves room for 0.01 (Zhang, 2025, table 5.5); Gymnasium's default for Ant is 0.5."""
-FORCE_LIMIT = 1.0
-"""Contact forces (N) and torques (N m) are clipped to this, as in Gymnasium's Ant-v5."""
 LONGEST_PERIOD = 10.0
 """Seconds that a control step may last."""
-HEALTHY_SHARES = (0.4, 2.0)
-"""Of the trunk's initial height: the healthy range of a model without rules of its own."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +95,12 @@ class RobotTask(Task):
     @property
     def parts(self) -> tuple[Part, ...]:
         """The limbs, each with its sensors and actuators."""
-        return self._anatomy[2].parts
+        return self._anatomy.sensing.parts
 
     @property
     def trunk(self) -> Part:  # type: ignore[override]
         """The trunk's sensors, and the actuators of its own joints."""
-        return self._anatomy[2].trunk
+        return self._anatomy.sensing.trunk
 
     @property
     def whole(self) -> tuple[int, ...]:
@@ -119,11 +113,11 @@ class RobotTask(Task):
     @property
     def sensor_names(self) -> tuple[str, ...]:
         """Name and unit of what is sensed, entry by entry, e.g. ``hip_1 position (rad)``."""
-        return self._anatomy[2].names
+        return self._anatomy.sensing.names
 
     def remarks_on(self, part: Part) -> dict[str, str]:
         """Its bodies, which part it is alike, and its joints with the signs that it senses them with."""
-        model, (body, _, _) = load(self.model), self._anatomy
+        model, body = load(self.model), self._anatomy.body
         if part == self.trunk:
             return {"bodies": ", ".join(body_name(model, each) for each in body.core)}
         limb = body.limbs[self.parts.index(part)]
@@ -140,12 +134,12 @@ class RobotTask(Task):
     @property
     def observation_size(self) -> int:
         """Number of readings."""
-        return len(self._anatomy[1].names)
+        return len(self._anatomy.readings.names)
 
     @property
     def sensed_size(self) -> int:
         """Number of entries that parts sense."""
-        return len(self._anatomy[2].names)
+        return len(self._anatomy.sensing.names)
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
@@ -159,7 +153,7 @@ class RobotTask(Task):
 
     def usual_reset_scale(self) -> float:
         """Noise on the initial pose as the model's rules have it."""
-        return rules_of(self.model).reset_scale
+        return self._rules.reset_scale
 
     def identity(self) -> dict[str, Any]:
         """The parameters, with the model by its content."""
@@ -177,7 +171,7 @@ class RobotTask(Task):
 
     def shared_by(self, subpopulations: Sequence[int]) -> RobotTask:
         """With `symmetry` decided: turns if some sharers are alike by nothing else, else mirrorings."""
-        body = self._anatomy[0]
+        body = self._anatomy.body
         if self.frame == "world" or self.symmetry is not None or not body.symmetries:
             return self
         classes = set(zip(subpopulations, [limb.likeness for limb in body.limbs], strict=True))
@@ -194,16 +188,12 @@ class RobotTask(Task):
 
     def metres_of(self, fitness: float) -> float:
         """Distance along x that an episode with this forward reward led (m)."""
-        return fitness / rules_of(self.model).forward_weight * self.seconds_of(1)
-
-    def seconds_of(self, steps: float) -> float:
-        """What so many control steps take (s)."""
-        return steps * float(load(self.model).opt.timestep) * self._substeps
+        return fitness / self._rules.forward_weight * self.step_seconds
 
     @property
     def step_seconds(self) -> float:
         """The model's time step times its substeps (s)."""
-        return self.seconds_of(1)
+        return float(load(self.model).opt.timestep) * self._substeps
 
     def open(self, *, training: bool) -> Simulation:
         """Open a new world with the model's own noise on the initial pose."""
@@ -212,29 +202,16 @@ class RobotTask(Task):
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
         dynamics.load_library()
-        model, data = load(self.model), mujoco.MjData(load(self.model))
-        world = dynamics.RobotWorld(
-            model=model._address,
-            data=data._address,
-            qpos=data.qpos,
-            qvel=data.qvel,
-            ctrl=data.ctrl,
-            xpos=data.xpos,
-            xipos=data.xipos,
-            cfrc_ext=data.cfrc_ext,
-            warnings=data.warning.number,
-            initial_qpos=data.qpos.copy(),
-            start_qpos=data.qpos.copy(),
-            start_qvel=data.qvel.copy(),
-            clock=np.zeros(3, dtype=np.int64),
-            mark=np.zeros(1),
+        model = load(self.model)
+        world, data = open_world(
+            model,
+            self._anatomy,
+            self._rules,
+            substeps=self._substeps,
+            reset_scale=float(reset_scale),
             max_steps=self.max_steps,
             progress=float(self.progress),
             patience=self.patience if training else 0,
-            reset_scale=float(reset_scale),
-            force_limit=FORCE_LIMIT,
-            **self._sensors_and_actuators(model),
-            **self._scoring(model),
         )
         functions = (dynamics.reset, dynamics.rewind, dynamics.observe, dynamics.step, dynamics.locate)
         sense, drive = (dynamics.sense, dynamics.drive) if self.frame == "part" else (None, None)
@@ -248,16 +225,15 @@ class RobotTask(Task):
         """MuJoCo's renderer, which needs EGL, OSMesa or a screen."""
         from exneat_cli.tasks.robots.picture import RobotCamera
 
-        return RobotCamera(load(self.model), self._anatomy[0].trunk, width, height)
+        return RobotCamera(load(self.model), self._anatomy.body.trunk, width, height)
 
     def adapter(self) -> Adapter:
         """Parts' own frames, and the range of the controls."""
-        own = self._sensors_and_actuators(load(self.model))
-        frames = own["frames"] if self.frame == "part" else None
+        model, readings = load(self.model), self._anatomy.readings
+        frames = self._anatomy.sensing.frames if self.frame == "part" else None
         signs = np.ones(len(self.actuator_names)) if frames is None else frames.action_signs
-        _, readings, _ = self._anatomy
         names = tuple(map(with_unit, readings.names, readings.units))
-        return Adapter(names, frames, signs, own["middle"], own["span"], bounded=False)
+        return Adapter(names, frames, signs, *control_range(model), bounded=False)
 
     def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
         """Open `count` worlds on a device, with `room` times the usual room for contacts.
@@ -271,51 +247,9 @@ class RobotTask(Task):
         simulation = self.open_disturbed(training=training, reset_scale=scale)
         return RobotWorlds(load(self.model), simulation, count, device, room)
 
-    def _sensors_and_actuators(self, model: mujoco.MjModel) -> dict[str, Any]:
-        low, high = np.where(model.actuator_ctrllimited[:, None], model.actuator_ctrlrange, (-1.0, 1.0)).T
-        _, readings, sensing = self._anatomy
-        return {
-            "positions": readings.positions,
-            "velocities": readings.velocities,
-            "bodies": readings.bodies,
-            "frames": sensing.frames,
-            "middle": 0.5 * (low + high),
-            "span": 0.5 * (high - low),
-        }
-
-    def _scoring(self, model: mujoco.MjModel) -> dict[str, Any]:
-        rules, (body, readings, sensing) = rules_of(self.model), self._anatomy
-        frames = sensing.frames
-        slide = int(model.jnt_qposadr[body.root[0]])
-        height = int(readings.positions[frames.height]) if frames.height >= 0 else -1
-        initial = float(model.qpos0[height]) + frames.above
-        lowest, highest = rules.heights or (HEALTHY_SHARES[0] * initial, HEALTHY_SHARES[1] * initial)
-        pitched = not frames.free and rules.steepest < np.inf
-        return {
-            "trunk": body.trunk,
-            "masses": model.body_mass.copy() if rules.speed == "mass" else np.zeros(0),
-            "along": slide if rules.speed == "slide" else -1,
-            "substeps": self._substeps,
-            "control_period": float(model.opt.timestep) * self._substeps,
-            "normal": rules.normal,
-            "height": height,
-            "above": frames.above,
-            "lowest": lowest,
-            "highest": highest,
-            "pitch": int(readings.positions[frames.orientation]) if pitched else -1,
-            "steepest": rules.steepest,
-            "largest": rules.largest,
-            "forward_weight": rules.forward_weight,
-            "healthy_reward": rules.healthy_reward,
-            "control_weight": THESIS_CONTROL_WEIGHT if self.reward == "thesis" else rules.control_weight,
-            "contact_weight": rules.contact_weight,
-            "cost_limit": rules.cost_limit,
-            "largest_contact_cost": rules.largest_contact_cost,
-        }
-
     @property
     def _substeps(self) -> int:
-        period = rules_of(self.model).control_period if self.control_period is None else self.control_period
+        period = self._rules.control_period if self.control_period is None else self.control_period
         timestep = float(load(self.model).opt.timestep)
         substeps = max(1, round(period / timestep))
         if abs(substeps * timestep - period) > 1e-9:
@@ -324,24 +258,14 @@ class RobotTask(Task):
         return substeps
 
     @property
-    def _anatomy(self) -> tuple[Body, Readings, Sensing]:
+    def _rules(self) -> Rules:
+        rules = rules_of(self.model)
+        return replace(rules, control_weight=THESIS_CONTROL_WEIGHT) if self.reward == "thesis" else rules
+
+    @property
+    def _anatomy(self) -> Anatomy:
         named = tuple((name, tuple(bodies)) for name, bodies in (self.part_bodies or {}).items())
-        by_place = rules_of(self.model).named_by_place
-        return _anatomy(
+        by_place = self._rules.named_by_place
+        return anatomy_of(
             load(self.model), by_place, self.part_order, self.symmetry, named, self.frame, self.contact_forces
         )
-
-
-@functools.lru_cache(maxsize=64)
-def _anatomy(
-    model: mujoco.MjModel,
-    by_place: bool,
-    order: str,
-    symmetry: str | None,
-    named: tuple[tuple[str, tuple[str, ...]], ...],
-    frame: str,
-    contact_forces: bool,
-) -> tuple[Body, Readings, Sensing]:
-    body = take_apart(model, order=order, symmetry=symmetry, parts=dict(named), by_place=by_place)
-    readings = read_off(model, body, contact_forces=contact_forces)
-    return body, readings, (in_the_world if frame == "world" else in_own_frames)(model, body, readings)
