@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from exneat_cli.analysis import styles
+from exneat_cli.analysis.champion_graph import Node
 from exneat_cli.analysis.network_graph import draw_still
-from exneat_cli.analysis.network_layout import Node
 from exneat_cli.records.champion import Champion
 
 Pixels = NDArray[np.uint8]

@@ -17,9 +17,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch
 from matplotlib.transforms import Bbox
 
+from exneat_cli.analysis import champion_graph as graph
 from exneat_cli.analysis import network_layout as layout
 from exneat_cli.analysis import styles
-from exneat_cli.analysis.network_layout import Node, Places
+from exneat_cli.analysis.champion_graph import Node
+from exneat_cli.analysis.network_layout import Places
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion, read_champion
@@ -104,7 +106,7 @@ def draw_still(axes: Axes, champion: Champion, width: float, height: float) -> P
 
 def _draw_connections(axes: Axes, champion: Champion, places: Places, width: float, height: float) -> set[Node]:
     """Empty the axes and draw links and connections; returns the nodes that lead to an actuator."""
-    used = layout.used_nodes(champion)
+    used = graph.used_nodes(champion)
     axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
     axes.set_axis_off()
     _draw_links(axes, champion, places, used)
@@ -115,8 +117,8 @@ def _draw_connections(axes: Axes, champion: Champion, places: Places, width: flo
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
     """Say what lines and shapes mean, as far as they occur in one of `champions`."""
     thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
-    hidden = sum(len(layout.edges_of(champion)) - len(layout.strongest_edges(champion)) for champion in champions)
-    delays = {is_delayed for champion in champions for _, _, is_delayed in layout.links_of(champion)}
+    hidden = sum(len(graph.edges_of(champion)) - len(graph.strongest_edges(champion)) for champion in champions)
+    delays = {is_delayed for champion in champions for _, _, is_delayed in graph.links_of(champion)}
     loops = not all(champion.feed_forward for champion in champions)
     entries: dict[str, styles.Look] = {
         "positive weight": {"color": POSITIVE, "linewidth": 2.0},
@@ -165,7 +167,7 @@ def _draw_curve(axes: Axes, start: tuple[float, float], end: tuple[float, float]
 
 
 def _draw_links(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
-    links = layout.links_of(champion)
+    links = graph.links_of(champion)
     opacity, width = (0.45, 0.6) if len(links) > _MANY_LINKS else (0.8, 0.9)
     for source, target, is_delayed in links:
         alpha = opacity if {source, target} <= used else FAINT
@@ -176,12 +178,12 @@ def _draw_links(axes: Axes, champion: Champion, places: Places, used: set[Node])
 
 def _thick_from(champion: Champion) -> float:
     """Weights from here on are drawn alike."""
-    return float(np.quantile([abs(weight) for _, _, weight in layout.edges_of(champion)] or [0.0], _ALIKE))
+    return float(np.quantile([abs(weight) for _, _, weight in graph.edges_of(champion)] or [0.0], _ALIKE))
 
 
 def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
     """Draw light ones first, so that the heavy ones stay visible among hundreds."""
-    edges, limit = layout.strongest_edges(champion), _thick_from(champion) or 1.0
+    edges, limit = graph.strongest_edges(champion), _thick_from(champion) or 1.0
     thickest, contrast = (2.2, 1.5) if len(edges) > _MANY_EDGES else (2.8, 1.0)
     lines, widths, colours = [], [], []
     for source, target, weight in edges:
@@ -208,7 +210,7 @@ def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: se
     groups = (
         ([(m, -1 - k) for k, pin in enumerate(module.pins) if pin.is_sensor], "o", "white", small),
         ([(m, -1 - k) for k, pin in enumerate(module.pins) if not pin.is_sensor], "s", _INNER, small),
-        ([node for node in layout.hidden_of(champion) if node[0] == m], "o", _INNER, 34.0),
+        ([node for node in graph.hidden_of(champion) if node[0] == m], "o", _INNER, 34.0),
         ([(m, output) for output in range(module.outputs)], "o", _GREY, 34.0),
     )
     for nodes, marker, face, size in groups:

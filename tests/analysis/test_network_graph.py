@@ -14,18 +14,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch
 
 from exneat_cli.analysis import network_graph
-from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
-from exneat_cli.analysis.network_layout import (
+from exneat_cli.analysis.champion_graph import (
     MOST_EDGES,
     depths,
     edges_of,
     hidden_of,
-    lay_out,
     links_of,
-    natural_size,
     strongest_edges,
     used_nodes,
 )
+from exneat_cli.analysis.network_graph import FAINT, NEGATIVE, POSITIVE, draw_champion, draw_network, legend_entries
+from exneat_cli.analysis.network_layout import lay_out, natural_size
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory, write_json
 from exneat_cli.records.champion import Champion
