@@ -30,7 +30,6 @@ COMMANDS = {
 }
 """Each command's name, which is also its module in `exneat_cli.commands`, and what it does."""
 
-_RESUMABLE = "exneat: interrupted; to go on:"
 _MAKING_FILES = ("train", "resume", "sweep", "search", "evaluate", "report")
 """What these say is no result, and may get lost."""
 
@@ -130,7 +129,8 @@ def _ended_by(error: BaseException, typed: str) -> int:
     A command may note how to go on with an error; else it is what was typed.
     """
     if isinstance(error, KeyboardInterrupt) or signal_heard() is not None:
-        print(_RESUMABLE, getattr(error, "__notes__", [typed])[-1], sep="\n", file=sys.stderr, flush=True)
+        command = getattr(error, "__notes__", [typed])[-1]
+        print(f"exneat: interrupted; to go on:\n{command}", file=sys.stderr, flush=True)
         return 128 + (signal_heard() or signal.SIGINT)
     if isinstance(error, ExneatError):
         message = str(error)

@@ -62,9 +62,10 @@ def show_run(run: RunDirectory) -> None:
     for module in champion.plan.modules:
         x, y = module.position
         print(f"{module.name}  at ({x:+.2f}, {y:+.2f}), subpopulation {module.subpopulation}")
-        for word, texts in (("senses", _sensed(champion, module)), ("reads", _links(champion, module))):
-            for text in texts:
-                print(_filled(word, text))
+        senses = "; ".join(champion.sensors[entry] for entry in module.sensors)
+        print(_filled("senses", senses or "nothing itself"))
+        for read in _links(champion, module):
+            print(_filled("reads", read))
         drives = "; ".join(champion.actuators[actuator] for actuator in module.drives)
         print(_filled("drives", drives or f"nothing; {module.outputs} outputs for others"))
         genome = champion.genomes[module.subpopulation]
@@ -75,10 +76,6 @@ def show_run(run: RunDirectory) -> None:
         print(f"  network  {sizes}, {enabled} enabled of {len(genome.connections)} connections\n")
     test = champion.scores.test
     print(f"test: fitness {test.fitness_mean:.4g} (sd {test.fitness_std:.3g}), {test.episodes} episodes")
-
-
-def _sensed(champion: Champion, module: Module) -> Iterable[str]:
-    yield "; ".join(champion.sensors[entry] for entry in module.sensors) or "nothing itself"
 
 
 def _links(champion: Champion, module: Module) -> Iterable[str]:

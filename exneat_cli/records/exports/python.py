@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import inspect
-import textwrap
+import pprint
 from collections.abc import Iterator
-from typing import Any
 
 from exneat_cli.algorithms import EvolutionSettings
 from exneat_cli.records.champion import Champion
@@ -22,8 +21,8 @@ def files(champion: Champion, task: Task, evolution: EvolutionSettings) -> dict[
     code = code.replace("def __init__(self, data):", "def __init__(self, data=DATA):")
     head = [f"# {line}".rstrip() for line in _description(champion, task)]
     imports, _, rest = code.lstrip().partition("\n\n")
-    literal = "\n".join(["DATA = {", *_entries(portable(champion, task), 1), "}"])
-    return {"": "\n".join([*head, "", imports, "", literal, "", rest])}
+    literal = pprint.pformat(portable(champion, task), width=_WIDTH, compact=True, sort_dicts=False)
+    return {"": "\n".join([*head, "", imports, "", f"DATA = {literal}", "", rest])}
 
 
 def _description(champion: Champion, task: Task) -> Iterator[str]:
@@ -48,19 +47,3 @@ def _description(champion: Champion, task: Task) -> Iterator[str]:
 
 def _numbered(names: tuple[str, ...]) -> Iterator[str]:
     yield from (f"  {entry:>3}  {name}" for entry, name in enumerate(names))
-
-
-def _entries(section: dict[str, Any], depth: int) -> Iterator[str]:
-    """The lines of a dict literal, long lists wrapped."""
-    pad = " " * (4 * depth)
-    for key, value in section.items():
-        if isinstance(value, dict):
-            yield from (f"{pad}{key!r}: {{", *_entries(value, depth + 1), f"{pad}}},")
-        elif value and isinstance(value, list) and isinstance(value[0], dict):
-            yield f"{pad}{key!r}: ["
-            for each in value:
-                yield from (f"{pad}    {{", *_entries(each, depth + 2), f"{pad}    }},")
-            yield f"{pad}],"
-        else:
-            options: Any = {"break_long_words": False, "break_on_hyphens": False, "subsequent_indent": f"{pad}    "}
-            yield textwrap.fill(f"{pad}{key!r}: {value!r},", _WIDTH, **options)
