@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -140,38 +140,13 @@ def _frames(
     moves: NDArray[np.float64],
     views: NDArray[np.int64],
 ) -> Frames:
-    pose, signs = Pose(model, body.trunk), np.ones(model.nu)
+    signs = np.ones(model.nu)
     for limb in body.limbs:
         signs[list(limb.relation.actuators)] = limb.relation.actuator_signs
-    free = len(body.root) == 1
-    if free:
-        (root,) = body.root
-        speed = int(model.jnt_dofadr[root])
-        velocities, axes, about = [readings.velocity(speed + k) for k in range(3)], np.eye(3), np.zeros(3)
-        height = readings.position(int(model.jnt_qposadr[root]) + 2)
-        orientation, spin, above = height + 1, readings.velocity(speed + 3), 0.0
-    else:
-        hinge = next(j for j in body.root if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE)
-        slides = tuple(j for j in body.root if j != hinge)
-        about, axes = pose.axes[hinge], pose.axes[list(slides)]
-        velocities = [readings.velocity(int(model.jnt_dofadr[j])) for j in slides]
-        rising = [j for j in slides if abs(pose.axes[j][2]) > 0.5]
-        address = int(model.jnt_qposadr[rising[0]]) if rising else -1
-        height = readings.position(address) if rising else -1
-        above = float(pose.height - model.qpos0[address]) if rising else 0.0
-        orientation = readings.position(int(model.jnt_qposadr[hinge]))
-        spin = readings.velocity(int(model.jnt_dofadr[hinge]))
     scalars = np.array(layout.scalars, np.int64).reshape(-1, 3)
     vectors = np.array(layout.vectors, np.int64).reshape(-1, 4)
     return Frames(
-        height=height,
-        above=above,
-        orientation=orientation,
-        free=free,
-        hinge=np.array(about, np.float64),
-        velocities=np.array(velocities, np.int64),
-        axes=np.array(axes, np.float64),
-        spin=spin,
+        **(_free_trunk if len(body.root) == 1 else _planar_trunk)(model, body, readings),
         moves=moves,
         views=views,
         scalar_from=scalars[:, 0].copy(),
@@ -185,12 +160,45 @@ def _frames(
     )
 
 
+def _free_trunk(model: mujoco.MjModel, body: Body, readings: Readings) -> dict[str, Any]:
+    """Where the trunk's height, orientation and velocities are read."""
+    (root,) = body.root
+    height, speed = readings.position(int(model.jnt_qposadr[root]) + 2), int(model.jnt_dofadr[root])
+    return {
+        "height": height,
+        "above": 0.0,
+        "orientation": height + 1,
+        "free": True,
+        "hinge": np.zeros(3),
+        "velocities": np.array([readings.velocity(speed + k) for k in range(3)], np.int64),
+        "axes": np.eye(3),
+        "spin": readings.velocity(speed + 3),
+    }
+
+
+def _planar_trunk(model: mujoco.MjModel, body: Body, readings: Readings) -> dict[str, Any]:
+    """The same of a trunk on two slides and a hinge."""
+    pose = Pose(model, body.trunk)
+    *slides, hinge = body.root
+    rising = [j for j in slides if abs(pose.axes[j][2]) > 0.5]
+    address = int(model.jnt_qposadr[rising[0]]) if rising else -1
+    return {
+        "height": readings.position(address) if rising else -1,
+        "above": float(pose.height - model.qpos0[address]) if rising else 0.0,
+        "orientation": readings.position(int(model.jnt_qposadr[hinge])),
+        "free": False,
+        "hinge": pose.axes[hinge].copy(),
+        "velocities": np.array([readings.velocity(int(model.jnt_dofadr[j])) for j in slides], np.int64),
+        "axes": pose.axes[slides],
+        "spin": readings.velocity(int(model.jnt_dofadr[hinge])),
+    }
+
+
 def _varying(model: mujoco.MjModel, body: Body) -> list[int]:
     """Which numbers of a view vary: in a plane, only what lies in it, and turns about its normal."""
     if len(body.root) == 1:
         return list(range(len(VIEW)))
-    axes = {int(model.jnt_type[j]): np.abs(model.jnt_axis[j]) > 0.5 for j in body.root}
-    normal = axes[int(mujoco.mjtJoint.mjJNT_HINGE)]
+    normal = np.abs(model.jnt_axis[body.root[-1]]) > 0.5  # the hinge's axis
     upright = not normal[2]
     return [
         *([0] if upright else []),
