@@ -1,6 +1,5 @@
 """Team and plan become flat arrays for one compiled kernel; also the brains that follow a fixed rule."""
 
-from exneat_cli.brains.assembly import assemble
+from exneat_cli.brains.assembly import assemble, places_in_memory
 from exneat_cli.brains.brain import Brains
-from exneat_cli.brains.memory import places_in_memory
 from exneat_cli.brains.rules import acting_by_rule, linear_fusion, motionless
