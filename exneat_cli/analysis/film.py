@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from exneat_cli.analysis import styles
 from exneat_cli.analysis.champion_graph import Node
-from exneat_cli.analysis.network_graph import draw_still
+from exneat_cli.analysis.network_graph import draw_champion
 from exneat_cli.records.champion import Champion
 
 Pixels = NDArray[np.uint8]
@@ -48,7 +48,7 @@ class Panel:
             figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
             canvas = FigureCanvasAgg(figure)
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - BAR / height))
-            places = draw_still(axes, champion, *inches)
+            places = draw_champion(axes, champion, *inches, with_nodes=False)
             letters = 7.5 / scale * min(1.0, width / LEGEND_WIDTH)  # as large in small pictures, where it fits
             figure.text(0.01, 1.0 - 0.5 * BAR / height, _LEGEND, fontsize=letters, va="center")
             canvas.draw()  # type: ignore[no-untyped-call]

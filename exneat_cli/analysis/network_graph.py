@@ -84,34 +84,25 @@ def champions_figure(
     return figure
 
 
-def draw_champion(axes: Axes, champion: Champion, width: float, height: float) -> None:
-    """Draw a champion on empty axes, which lose their frame and ticks; text is made to fit their size in inches."""
-    boxes, places = layout.lay_out(champion, width, height)
-    used = _draw_connections(axes, champion, places, width, height)
-    for m, box in enumerate(boxes):
-        _draw_box(axes, champion, m, box)
-        _draw_nodes(axes, champion, m, places, used)
-        _name_inputs(axes, champion, m, places)
+def draw_champion(axes: Axes, champion: Champion, width: float, height: float, *, with_nodes: bool = True) -> Places:
+    """Draw a champion on empty axes, which lose their frame and ticks; text is made to fit their size in inches.
 
-
-def draw_still(axes: Axes, champion: Champion, width: float, height: float) -> Places:
-    """Draw a champion without its nodes; returns their places, for somebody else to draw them on."""
-    boxes, places = layout.lay_out(champion, width, height, named=False)
-    _draw_connections(axes, champion, places, width, height)
-    for m, box in enumerate(boxes):
-        _draw_box(axes, champion, m, box)
-        _name_outputs(axes, champion, m, places)
-    return places
-
-
-def _draw_connections(axes: Axes, champion: Champion, places: Places, width: float, height: float) -> set[Node]:
-    """Empty the axes and draw links and connections; returns the nodes that lead to an actuator."""
+    Returns the places of the nodes; without them, and the names of inputs, somebody else is to draw them there.
+    """
+    boxes, places = layout.lay_out(champion, width, height, named=with_nodes)
     used = graph.used_nodes(champion)
     axes.set(xlim=(-0.02, width + 0.02), ylim=(-0.02, height + 0.02))
     axes.set_axis_off()
     _draw_links(axes, champion, places, used)
     _draw_edges(axes, champion, places, used)
-    return used
+    for m, box in enumerate(boxes):
+        _draw_box(axes, champion, m, box)
+        if with_nodes:
+            _draw_nodes(axes, champion, m, places, used)
+        _name_outputs(axes, champion, m, places)
+        if with_nodes:
+            _name_inputs(axes, champion, m, places)
+    return places
 
 
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
@@ -204,7 +195,7 @@ def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node])
 
 
 def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: set[Node]) -> None:
-    """Draw inputs, hidden nodes and outputs, and name the actuators that the outputs drive."""
+    """Draw inputs, hidden nodes and outputs."""
     module = champion.plan.modules[m]
     small = 10.0 if len(module.pins) > 30 else 22.0
     groups = (
@@ -219,7 +210,6 @@ def _draw_nodes(axes: Axes, champion: Champion, m: int, places: Places, used: se
         if nodes:
             x, y = zip(*(places[node] for node in nodes), strict=True)
             axes.scatter(x, y, size, faces, marker=marker, edgecolors=rims, linewidths=0.7, zorder=3)
-    _name_outputs(axes, champion, m, places)
 
 
 def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
@@ -238,22 +228,16 @@ def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None
     """Write under each input what it reads, or where that does not fit how many inputs there are of each kind."""
     pins = champion.plan.modules[m].pins
     x = [places[m, -1 - k][0] for k in range(len(pins))]
-    if layout.are_by_kind(champion, m):
-        for group in layout.input_groups(champion, m):
-            left, right, y = x[group[0]], x[group[-1]], places[m, -1 - group[0]][1] - 0.07
-            axes.plot([left - 0.03, right + 0.03], [y, y], color=_GREY, linewidth=0.7)
-            name = layout.group_name(champion, m, group)
-            look: styles.Look = {"fontsize": layout.KIND_SIZE, "rotation": 90, "ha": "center", "va": "top"}
-            axes.text((left + right) / 2, y - 0.03, name, **look)
-        return
-    if layout.POINTS * min((right - left for left, right in pairwise(x)), default=1.0) >= _LEAST_ROOM:
+    by_kind = layout.are_by_kind(champion, m)
+    room = layout.POINTS * min((right - left for left, right in pairwise(x)), default=1.0)
+    if not by_kind and room >= _LEAST_ROOM:
         for k, name in enumerate(layout.input_names(champion, m)):
             y = places[m, -1 - k][1] - 0.07
             axes.text(x[k], y, name, fontsize=layout.NAME_SIZE, rotation=90, ha="center", va="top")
         return
     for group in layout.input_groups(champion, m):
-        y = places[m, -1 - group[0]][1]
-        left, right = x[group[0]], x[group[-1]]
-        axes.plot([left - 0.03, right + 0.03], [y - 0.1, y - 0.1], color=_GREY, linewidth=0.7)
-        count = layout.group_name(champion, m, group).replace(" of others", "\nof others")
-        axes.text((left + right) / 2, y - 0.13, count, fontsize=6.0, ha="center", va="top")
+        left, right, y = x[group[0]], x[group[-1]], places[m, -1 - group[0]][1] - (0.07 if by_kind else 0.1)
+        axes.plot([left - 0.03, right + 0.03], [y, y], color=_GREY, linewidth=0.7)
+        name = layout.group_name(champion, m, group)
+        look: styles.Look = {"fontsize": layout.KIND_SIZE, "rotation": 90 * by_kind, "ha": "center", "va": "top"}
+        axes.text((left + right) / 2, y - 0.03, name if by_kind else name.replace(" of others", "\nof others"), **look)
