@@ -176,10 +176,8 @@ def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *
         widths = {module.name: module.shape for module in modules if module.subpopulation == shared}
         if len(set(widths.values())) > 1:
             raise ConfigError("geometry", "sharers of equal widths (inputs, hidden nodes, outputs)", widths)
-    if central:
-        modules.append(_central_module(task, modules, hidden))
-    elif wiring.trunk == "module":
-        modules.append(_trunk_module(task, modules, hidden))
+    if central or wiring.trunk == "module":
+        modules.append(_trunk_module(task, modules, hidden, central=central))
     return Plan(tuple(modules), task.sensed_size, len(task.actuator_names))
 
 
@@ -244,31 +242,19 @@ def _refusal(
     return f"such links read {'; and '.join(missing)}" if missing else ""
 
 
-def _central_module(task: Task, encoders: Sequence[Module], hidden: int) -> Module:
+def _trunk_module(task: Task, others: Sequence[Module], hidden: int, *, central: bool) -> Module:
+    """The module that senses the trunk, and drives its joints; a central one reads the others too and drives all."""
     assert task.trunk is not None
-    encoded = [Pin(k, own) for own, encoder in enumerate(encoders) for k in range(encoder.outputs)]
-    actuators = tuple(range(len(task.actuator_names)))
+    read = [Pin(k, own) for own, other in enumerate(others) for k in range(other.outputs)] if central else []
+    actuators = tuple(range(len(task.actuator_names))) if central else task.trunk.actuators
     return Module(
-        name=CENTRAL,
+        name=CENTRAL if central else task.trunk.name,
         position=task.trunk.position,
-        subpopulation=1 + max(encoder.subpopulation for encoder in encoders),
-        pins=(*map(Pin, task.trunk.sensors), *encoded),
+        subpopulation=1 + max(other.subpopulation for other in others),
+        pins=(*map(Pin, task.trunk.sensors), *read),
         outputs=len(actuators),
         hidden=hidden,
         drives=actuators,
-    )
-
-
-def _trunk_module(task: Task, modules: Sequence[Module], hidden: int) -> Module:
-    assert task.trunk is not None
-    return Module(
-        name=task.trunk.name,
-        position=task.trunk.position,
-        subpopulation=1 + max(module.subpopulation for module in modules),
-        pins=tuple(map(Pin, task.trunk.sensors)),
-        outputs=len(task.trunk.actuators),
-        hidden=hidden,
-        drives=task.trunk.actuators,
     )
 
 
