@@ -86,14 +86,8 @@ class Layout:
             nodes[:] = genome.nodes
             first = last + len(genome.nodes)
             nodes["bias"] = folded[:, last:first]
-            members.append([_genome(*genes) for genes in zip(ids, nodes, connections, strict=True)])
+            members.append([ArrayGenome(*genes) for genes in zip(ids, nodes, connections, strict=True)])
         return [Team(own, (key,) * len(own)) for key, own in zip(ids, zip(*members, strict=True), strict=True)]
-
-
-def _genome(key: int, nodes: NDArray[np.void], connections: NDArray[np.void]) -> ArrayGenome:
-    genome = ArrayGenome(key)
-    genome.nodes, genome.connections = nodes, connections
-    return genome
 
 
 def _of_connections(sources: NDArray[np.int64], moments: Moments) -> tuple[Vectors, Vectors]:

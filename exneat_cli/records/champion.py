@@ -74,10 +74,9 @@ class Genome(Struct, frozen=True, forbid_unknown_fields=True):
         Raises:
             ValueError: a node or connection comes twice, or a connection has an end that does not exist.
         """
-        genome = ArrayGenome(self.id)
         nodes = [(each.id, each.bias, each.response, ACTIVATIONS.index(each.activation)) for each in self.nodes]
         connections = [(c.target, c.source, c.innovation, c.weight, c.enabled) for c in self.connections]
-        genome.nodes, genome.connections = np.array(sorted(nodes), NODE), np.array(sorted(connections), CONNECTION)
+        genome = ArrayGenome(self.id, np.array(sorted(nodes), NODE), np.array(sorted(connections), CONNECTION))
         check_genes(genome)
         return genome
 

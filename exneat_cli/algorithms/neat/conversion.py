@@ -23,11 +23,10 @@ _WHOLE = np.dtype(np.int64)
 
 def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
     """The same genome in arrays; raises what `tables_of` raises."""
-    converted = ArrayGenome(genome.key)
-    converted.fitness = genome.fitness
     nodes, connections = tables_of(genome)
-    converted.nodes = np.sort(nodes, order="key")
-    converted.connections = np.sort(connections, order=["target", "source"])
+    in_order = np.sort(nodes, order="key"), np.sort(connections, order=["target", "source"])
+    converted = ArrayGenome(genome.key, *in_order)
+    converted.fitness = genome.fitness
     return converted
 
 
@@ -158,9 +157,8 @@ def unpack(
             raise ValueError(f"{prefix}.power: expected finite numbers above 0")
     genomes = []
     for key, power, own_nodes, own_connections in zip(keys.tolist(), powers, nodes, connections, strict=True):
-        genome = ArrayGenome(key)
+        genome = ArrayGenome(key, own_nodes.copy(), own_connections.copy())
         genome.power = power
-        genome.nodes, genome.connections = own_nodes.copy(), own_connections.copy()
         check_genes(genome)
         check_genome(genome, shape[0], shape[2], feed_forward=feed_forward)
         ordered = np.lexsort((own_connections["source"], own_connections["target"]))

@@ -21,6 +21,7 @@ from exneat_cli.algorithms.neat.genes import (
     NODE,
     Connections,
     Genes,
+    Nodes,
     Number,
     cross,
     draw,
@@ -54,11 +55,11 @@ class ArrayGenome:
 
     __slots__ = ("connections", "fitness", "key", "nodes", "power")
 
-    def __init__(self, key: int) -> None:
+    def __init__(self, key: int, nodes: Nodes | None = None, connections: Connections | None = None) -> None:
         self.key = key
         self.fitness: Any = None
-        self.nodes = np.zeros(0, NODE)
-        self.connections = np.zeros(0, CONNECTION)
+        self.nodes = np.zeros(0, NODE) if nodes is None else nodes
+        self.connections = np.zeros(0, CONNECTION) if connections is None else connections
         self.power: float | None = None
 
     @property
