@@ -52,12 +52,9 @@ def generator(seed: SeedSequence) -> Generator:
 
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
     """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
+    purposes = ("world", "sensor_noise", "action_ties")
     return [
-        EpisodeSeeds(
-            stream(root, "world", generation, episode),
-            stream(root, "sensor_noise", generation, episode),
-            stream(root, "action_ties", generation, episode),
-        )
+        EpisodeSeeds(*(stream(root, purpose, generation, episode) for purpose in purposes))
         for episode in range(first, first + count)
     ]
 

@@ -24,17 +24,15 @@ def latex_table(title: str, caption: str, header: Sequence[str], rows: Sequence[
     Numbers stand right, all else left, and room is left where the first cell changes. `caption` is a comment above.
     """
     columns = list(zip(*rows, strict=True)) or [()] * len(header)
-    sides = "".join("r" if any(cells) and all(map(_is_number, filter(None, cells))) else "l" for cells in columns)
+    sides = "".join(
+        "r" if any(cells) and all(map(_NUMBER.fullmatch, filter(None, cells))) else "l" for cells in columns
+    )
     lines = [f"% {title}: needs \\usepackage{{booktabs}}", f"% {' '.join(caption.split())}"]
     lines += [f"\\begin{{tabular}}{{{sides}}}", r"\toprule", _row(header), r"\midrule"]
     for above, row in zip([None, *rows], rows, strict=False):
         lines += [r"\addlinespace"] if above is not None and above[0] != row[0] else []
         lines.append(_row(row))
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
-
-
-def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell) is not None
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -62,7 +62,8 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     try:
         senses, acts = env.observation_space, env.action_space
         max_steps = env.spec.max_episode_steps if env.spec else None
-        shown = _looks_of(env)
+        modes, fps = env.metadata.get("render_modes") or (), env.metadata.get("render_fps")
+        shown = tuple(map(str, modes)), float(fps) if fps else None, simulated_by_mujoco(env) is not None
     finally:
         env.close()
     if not isinstance(senses, spaces.Box) or senses.dtype.kind not in "biuf" or not senses.shape:
@@ -79,12 +80,6 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
     lowest = np.where(has_low, low, np.where(has_high, high - 2.0, -1.0))
     highest = np.where(has_high, high, np.where(has_low, low + 2.0, 1.0))
     return Interface(size, len(low), lowest, highest, acts, None, max_steps, *shown)
-
-
-def _looks_of(env: gymnasium.Env[Any, Any]) -> tuple[tuple[str, ...], float | None, bool]:
-    """The last three fields of an `Interface`."""
-    modes, fps = env.metadata.get("render_modes") or (), env.metadata.get("render_fps")
-    return tuple(map(str, modes)), float(fps) if fps else None, simulated_by_mujoco(env) is not None
 
 
 def simulated_by_mujoco(env: gymnasium.Env[Any, Any]) -> mujoco.MjData | None:

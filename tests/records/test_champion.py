@@ -25,7 +25,6 @@ from exneat_cli.tasks import AntTask
 from exneat_cli.wiring import Geometry
 
 Place = tuple[Any, ...]
-TEST = Score(3, 1.0, 0.5, 2.0, 0.5, 0, (0.5, 1.0, 1.5))
 
 
 def score_of(mean: float) -> Score:

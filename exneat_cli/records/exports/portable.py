@@ -99,19 +99,15 @@ def _frames(frames: Any, task: Task) -> Plain:
         pick[first : first + 3] = height + 1 + 12 * count + 3 * vector + np.arange(3)
     handedness = np.sign(np.linalg.det(frames.moves))
     pseudo = frames.vector_is_pseudo
+    as_they_are = ("hinge", "velocities", "axes", "moves", "vector_from", "vector_frame")
     return {
         "free": bool(frames.free),
         "orientation": int(frames.orientation),
-        "hinge": frames.hinge.tolist(),
         "height": max(0, int(frames.height)),
         "above": float(frames.above),
-        "velocities": frames.velocities.tolist(),
-        "axes": frames.axes.tolist(),
         "spin": int(frames.spin),
-        "moves": frames.moves.tolist(),
+        **{name: getattr(frames, name).tolist() for name in as_they_are},
         "handedness": handedness.tolist(),
-        "vector_from": frames.vector_from.tolist(),
-        "vector_frame": frames.vector_frame.tolist(),
         "vector_sign": np.where(pseudo, handedness[frames.vector_frame], 1.0).tolist(),
         "pick": pick.tolist(),
         "sign": sign.tolist(),

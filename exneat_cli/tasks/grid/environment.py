@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exneat_cli.tasks import TASKS
 from exneat_cli.tasks.grid.picture import coloured, enlarged
-from exneat_cli.tasks.grid.world import COLUMN, MOVES, ROW, GridTask
+from exneat_cli.tasks.grid.world import MOVES, GridTask
 from exneat_cli.tasks.task import RUNNING
 
 PIXELS_PER_TILE = 16
@@ -83,9 +83,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
         if draw is None:
             gymnasium.logger.warn("render() needs a render_mode, rgb_array or ansi, given to gymnasium.make")
             return None
-        world = self._simulation.world
-        agent = int(world.agent[ROW]), int(world.agent[COLUMN])
-        return draw(self.task.tiles(world), agent, self.task.targets(world))
+        return draw(*self.task.snapshot(self._simulation.world))
 
     def _observe(self) -> NDArray[np.float64]:
         self._simulation.observe(self._simulation.world, self._observation)

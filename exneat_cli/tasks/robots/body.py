@@ -122,9 +122,8 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
     for actuator in range(model.nu):
         if model.actuator_trntype[actuator] not in _JOINT_ACTUATORS:
             kind = mujoco.mjtTrn(model.actuator_trntype[actuator]).name.removeprefix("mjTRN_").lower()
-            raise ConfigError(
-                "task.model", "actuators that drive joints", f"{_label(model, actuator)}, which drives a {kind}"
-            )
+            name = model.actuator(actuator).name or f"actuator {actuator}"
+            raise ConfigError("task.model", "actuators that drive joints", f"{name}, which drives a {kind}")
     driven = set(model.actuator_trnid[:, 0].tolist())
     found = []
     for body in np.flatnonzero(model.body_parentid == 0)[1:].tolist():
@@ -268,7 +267,3 @@ def _itself(pose: Pose, part: Sequence[int]) -> Relation:
 def printable(name: str) -> str:
     """A name of the model as far as it can be shown: files may hold line breaks and names without end."""
     return "".join(filter(str.isprintable, name))[:LONGEST_NAME]
-
-
-def _label(model: mujoco.MjModel, actuator: int) -> str:
-    return model.actuator(actuator).name or f"actuator {actuator}"
