@@ -30,7 +30,6 @@ class Progress:
         stream: where the lines go; without it nothing is said, which is the default from Python.
         bar: stands in for the lines.
         tenths: whether a log gets a line every tenth part of the run, and what comes after.
-        silence: seconds after which a log gets a line anyway.
         doing: what that line says is going on; left out, the part of the run.
     """
 
@@ -40,10 +39,9 @@ class Progress:
         bar: Bar | None = None,
         *,
         tenths: bool = True,
-        silence: float = LONGEST_SILENCE,
         doing: Callable[[], str] | None = None,
     ) -> None:
-        self._stream, self._bar, self._tenths, self._silence = stream, bar, tenths, silence
+        self._stream, self._bar, self._tenths = stream, bar, tenths
         self._title, self._unit, self._total, self._done = "", "", 0, 0
         self._began = self._spoke = time.perf_counter()
         self._doing = doing or self._part
@@ -102,7 +100,7 @@ class Progress:
             self._bar.update(self._task, completed=number, figures=figures, left=left)
             return
         is_tenth = number % max(1, self._total // 10) == 0 or number == self._total
-        if (is_tenth and self._tenths) or time.perf_counter() - self._spoke >= self._silence:
+        if (is_tenth and self._tenths) or time.perf_counter() - self._spoke >= LONGEST_SILENCE:
             self.say(f"{self._unit} {number}/{self._total}  {figures}  {each:.2f} s each, {left}")
 
     def stop(self) -> None:
@@ -119,9 +117,8 @@ class Progress:
         return self._stage or f"{self._unit} {min(self._done + 1, self._total)}/{self._total}"
 
     def _tick(self, over: threading.Event) -> None:
-        while not over.wait(max(0.01, self._spoke + self._silence - time.perf_counter())):
-            silent = time.perf_counter() - self._spoke
-            if silent >= self._silence:
+        while not over.wait(max(0.01, self._spoke + LONGEST_SILENCE - time.perf_counter())):
+            if time.perf_counter() - self._spoke >= LONGEST_SILENCE:
                 since = timedelta(seconds=round(time.perf_counter() - self._began))
                 self.say(f"{self._doing()} goes on, {since} since the start")
 

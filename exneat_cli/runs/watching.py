@@ -12,7 +12,7 @@ from exneat_cli.brains import places_in_memory
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion
-from exneat_cli.rollouts import Noise, Sweep, perturbed, record
+from exneat_cli.rollouts import Recording, Sweep, perturbed, record
 from exneat_cli.runs.robustness import load_champion, load_settings
 from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import HasDistance, HasPicture, HasTiles, Task
@@ -75,37 +75,37 @@ def record_champion(
         raise ExneatError(f"task={task.name}: expected a task whose worlds can be drawn\n  {fix}")
     every = 1 if period is None else max(1, round(1.0 / ((fps or BODY_FPS) * period)))
     recording = record(task, noise, champion.brain(), _seeds(episode, seed), steps, every)
-    places = places_in_memory(
-        champion.plan, [genome.in_arrays() for genome in champion.genomes], feed_forward=champion.feed_forward
-    )
+    nodes, values = _values(champion, recording, every)
+    captions = _captions(task, recording.trace, range(0, len(values), every))
+    level = "" if sweep is None else f", {sweep.name} {sweep.levels[0]:g}"
+    # So far: nodes of relu that feed themselves may grow without bounds, and would seem to begin with nothing.
+    largest = np.maximum.accumulate(np.abs(values), axis=0)
+    shares = (values / np.where(largest > 0.0, largest, 1.0))[::every]
+    pace = (fps or STEP_FPS) if period is None else 1.0 / (every * period)
+    return Scene(task, champion, directory.path.name + level, nodes, recording.snapshots, shares, captions, pace)
+
+
+def _values(champion: Champion, recording: Recording, every: int) -> tuple[list[tuple[int, int]], NDArray[np.float64]]:
+    """Inputs and nodes that are ever evaluated, and (steps, nodes) their values when the world was as at that step."""
+    genomes = [genome.in_arrays() for genome in champion.genomes]
+    places = places_in_memory(champion.plan, genomes, feed_forward=champion.feed_forward)
     nodes = list(places)
-    values = recording.values[:, [places[node] for node in nodes]]
+    values = recording.values[:, list(places.values())]
     if not champion.feed_forward:
         # What a module read of another one is what that one held at the step before.
-        linked = [
-            k for k, (m, key) in enumerate(nodes) if key < 0 and not champion.plan.modules[m].pins[-1 - key].is_sensor
-        ]
+        modules = champion.plan.modules
+        linked = [k for k, (m, key) in enumerate(nodes) if key < 0 and not modules[m].pins[-1 - key].is_sensor]
         values[1:, linked] = values[:-1, linked].copy()
         values[0, linked] = 0.0
     if len(recording.snapshots) > len(values[::every]):  # what the last step led to, at which no network looks
         values = np.concatenate([values, values[-1:]])
-    # So far: nodes of relu that feed themselves may grow without bounds, and would seem to begin with nothing.
-    largest = np.maximum.accumulate(np.abs(values), axis=0)
-    captions = _captions(task, recording.trace, range(0, len(values), every))
-    title = directory.path.name + _level(sweep, noise)
-    shares = (values / np.where(largest > 0.0, largest, 1.0))[::every]
-    pace = (fps or STEP_FPS) if period is None else 1.0 / (every * period)
-    return Scene(task, champion, title, nodes, recording.snapshots, shares, captions, pace)
+    return nodes, values
 
 
 def _seeds(episode: int, seed: int | None) -> EpisodeSeeds:
     if seed is None:
         return shared_episodes("test", episode + 1)[-1]
     return EpisodeSeeds(*(stream(seed, "test", episode, kind) for kind in range(3)))
-
-
-def _level(sweep: Sweep | None, noise: Noise) -> str:
-    return "" if sweep is None else f", {sweep.name} {sweep.levels[0]:g}"
 
 
 def _captions(task: Task, trace: NDArray[np.float64], shown: range) -> list[str]:

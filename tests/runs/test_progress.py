@@ -31,9 +31,10 @@ def test_a_log_gets_about_ten_lines_and_always_the_last_generation() -> None:
     assert written[-1].startswith("neat-s0: generation 95/95  best -12.34  mean 1234  so far 12.34  0.0")
 
 
-def test_a_log_gets_a_line_where_nothing_ends_for_long() -> None:
+def test_a_log_gets_a_line_where_nothing_ends_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("exneat_cli.runs.progress.LONGEST_SILENCE", 0.02)
     stream = io.StringIO()
-    lines = Progress(stream, silence=0.02)
+    lines = Progress(stream)
     lines.start("neat-s0", 95)
     while "generation 1/95 goes on" not in stream.getvalue():
         time.sleep(0.01)
