@@ -91,17 +91,10 @@ class RobotWorlds:
         self._place, self._mark = wp.zeros(count, dtype=float), wp.zeros(count, dtype=float)
         self._clock = wp.zeros((count, 2), dtype=int)
         self.readings_size = world.positions.size + world.velocities.size + 6 * world.bodies.size
-        self._sensors = _filled(
-            kernels.Sensors(),
-            positions=world.positions,
-            velocities=world.velocities,
-            bodies=world.bodies,
-            force_limit=world.force_limit,
-        )
+        self._sensors = _filled(kernels.Sensors, world)
         self._view = _filled(
-            kernels.View(),
-            **{name: getattr(f, name) for name in ("height", "above", "orientation", "velocities", "spin", "views")},
-            **{name: getattr(f, name) for name in ("vector_from", "vector_to", "vector_frame", "vector_is_pseudo")},
+            kernels.View,
+            f,
             free=int(f.free),
             hinge=wp.vec3(*f.hinge.tolist()),
             axes=wp.array(f.axes, dtype=wp.vec3),
@@ -111,9 +104,7 @@ class RobotWorlds:
         self._joints = _uploaded(f.scalar_from), _uploaded(f.scalar_to), _uploaded(f.scalar_sign)
         signs = f.action_signs if self.is_framed else np.ones(model.nu)
         self._drive = _uploaded(signs), _uploaded(world.middle), _uploaded(world.span)
-        names = [name for name in world._fields if name in judging.Rules.vars]  # type: ignore[attr-defined]
-        rules = {name: getattr(world, name) for name in names}
-        self._rules = _filled(judging.Rules(), **rules, total_mass=float(world.masses.sum()))
+        self._rules = _filled(judging.Rules, world, total_mass=float(world.masses.sum()))
 
     def starts(self, episodes: Sequence[EpisodeSeeds]) -> NDArray[np.float32]:
         """(E, `start_size`) the starts of episodes, drawn as worlds on the CPU draw them."""
@@ -213,7 +204,9 @@ def _uploaded(values: NDArray[Any]) -> wp.array:
     return wp.array(np.ascontiguousarray(values.astype(kinds[values.dtype.kind])))
 
 
-def _filled(struct: Any, **values: Any) -> Any:
-    for name, value in values.items():
-        setattr(struct, name, _uploaded(value) if isinstance(value, np.ndarray) else value)
+def _filled(kind: Any, source: Any, **others: Any) -> Any:
+    """A struct of Warp's with the fields of a named tuple, and others."""
+    struct, values = kind(), source._asdict() | others
+    for name in kind.vars:
+        setattr(struct, name, _uploaded(values[name]) if isinstance(values[name], np.ndarray) else values[name])
     return struct
