@@ -63,6 +63,22 @@ def run(line: CommandLine) -> int:
     if not any(study.reached for study in studies.values()):
         raise _nothing_to_report(asked, sources, commands)
     directory = Path(asked["output"]) / "report" / (own.name if own else "")
+    built, missing = _build(artefacts, studies, directory, asked, paper)
+    if asked["only"] is None:
+        built += [build_comparison(study, directory) for study in studies.values() if study.reached]
+        page = write_index(directory, studies, built, missing)
+        print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs\n{page}")
+    return 0
+
+
+def _build(
+    artefacts: Mapping[str, FigurePlan | TablePlan],
+    studies: Mapping[str, Study],
+    directory: Path,
+    asked: Mapping[str, Any],
+    paper: Paper,
+) -> tuple[list[Built], dict[str, str]]:
+    """Build what has its runs; returns that, and by name why the others could not be built."""
     built: list[Built] = []
     missing: dict[str, str] = {}
     for name, artefact in artefacts.items():
@@ -78,11 +94,7 @@ def run(line: CommandLine) -> int:
             print(f"{name}: {error}", file=sys.stderr)
         else:
             print("\n".join(map(str, built[-1].paths)), flush=True)
-    if asked["only"] is None:
-        built += [build_comparison(study, directory) for study in studies.values() if study.reached]
-        page = write_index(directory, studies, built, missing)
-        print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs\n{page}")
-    return 0
+    return built, missing
 
 
 def _paper(asked: Mapping[str, Any]) -> Paper:
