@@ -7,18 +7,9 @@ from typing import Any
 
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.drawing import choose_renderer, drawn, frames_of
-from exneat_cli.commands.jobs import finished_runs, name_code, with_sweeps
+from exneat_cli.commands.jobs import finished_runs, name_code_of_runs, with_sweeps
 from exneat_cli.commands.live import show
-from exneat_cli.errors import (
-    ConfigError,
-    check_choice,
-    check_flag,
-    check_keys,
-    check_path,
-    check_real,
-    check_section,
-    check_whole,
-)
+from exneat_cli.errors import ConfigError, check_choice, check_flag, check_path, check_real, check_section, check_whole
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.video import VIDEO_FORMATS, check_video_library, write_video
 from exneat_cli.rollouts import Executor, Sweep
@@ -40,7 +31,7 @@ def run(line: CommandLine) -> int:
     """
     plain = line.compose_only((*_KEYS, "task", "sweeps"), ("sweep",))
     _check(plain)
-    name_code(line, plain)
+    name_code_of_runs(line, plain)
     runs = finished_runs(plain["run"])
     form, output = plain["format"], plain["output"]
     if not plain["live"]:
@@ -83,7 +74,6 @@ def film_champion(directory: RunDirectory) -> None:
 
 
 def _check(plain: Mapping[str, Any]) -> None:
-    check_keys("task.", check_section("task", plain["task"]), ("kind", "env_id"))
     check_choice("format", plain["format"], list(VIDEO_FORMATS))
     if plain["panel"] is not None:
         check_choice("panel", plain["panel"], ["networks", "none"])
