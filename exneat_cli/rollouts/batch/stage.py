@@ -33,9 +33,6 @@ class Stage:
         slots: S.
         sensed_size, action_size, terms: of the task.
         moments: whether statistics of what networks sense are wanted.
-
-    Attributes:
-        control_steps: how many were done, of all worlds at once.
     """
 
     def __init__(
@@ -50,7 +47,6 @@ class Stage:
         moments: bool,
     ) -> None:
         self._worlds, self._sd, self._slots = worlds, sensor_std, slots
-        self._sensed_size, self.control_steps = sensed_size, 0
         count = worlds.count
         self.device = worlds.status.device
         self._graph: Any = None
@@ -111,7 +107,6 @@ class Stage:
                     wp.capture_launch(self._graph)
                 else:
                     self._program()
-            self.control_steps += steps
 
     def look(self) -> tuple[NDArray[np.int32], bool]:
         """(S,) how many episodes of each slot have ended when all that was launched is done; whether room ran out."""
