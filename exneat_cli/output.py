@@ -48,10 +48,10 @@ def _forgiving(stream: TextIO | None, lost: list[OSError]) -> TextIO:
         raw = _Forgiving(stream.fileno(), lost)
     except (OSError, ValueError):  # a notebook's or a test's, which is no file
         return stream
-    look: dict[str, Any] = {"encoding": stream.encoding, "errors": "backslashreplace"}
-    for name in ("line_buffering", "write_through"):
-        look[name] = getattr(stream, name, True)
-    return io.TextIOWrapper(io.BufferedWriter(raw), **look)
+    # Unbuffered, as by PYTHONUNBUFFERED, Python keeps no lines: then a line is written when it ends.
+    by_line = any(getattr(stream, name, True) for name in ("line_buffering", "write_through"))
+    buffered = io.BufferedWriter(raw)
+    return io.TextIOWrapper(buffered, stream.encoding, "backslashreplace", line_buffering=by_line)
 
 
 class _Forgiving(io.FileIO):

@@ -66,6 +66,13 @@ def test_a_terminal_that_goes_away_and_a_pipe_that_does_not_wait_end_nothing(tmp
     assert process.wait() == 0
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_line_on_standard_error_is_there_when_a_process_is_killed(unbuffered: str, tmp_path: Path) -> None:
+    (tmp_path / "killed.py").write_text(f"{PRINTING}    os.kill(os.getpid(), 9)")
+    done = shell(f"PYTHONUNBUFFERED={unbuffered} {sys.executable} killed.py", tmp_path)
+    assert done.stderr.count("told on standard error") == 3000
+
+
 def test_a_training_that_nobody_reads_is_done(tmp_path: Path) -> None:
     train = f"{PROGRAM} train task=track_maze budget=smoke executor=serial output=out"
     assert shell(f"{train} 2>&1 | head -1", tmp_path).returncode == 0

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.synchronize import Event
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,7 +74,8 @@ def drawn(
     moments = [[_moment(scene, k) for scene in scenes] for k in range(frames_of(scenes))]
     portions = [moments[k : k + PORTION] for k in range(0, len(moments), PORTION)]
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(portions)), context, _prepare, (looks, size))
+    over = context.Event()
+    pool = ProcessPoolExecutor(min(workers, len(portions)), context, _prepare, (looks, size, over))
     try:
         waiting: list[Future[list[NDArray[np.uint8]]]] = []
         for portion in portions:
@@ -85,6 +87,7 @@ def drawn(
     except BrokenProcessPool as error:
         raise ExneatError("watch: a process that drew frames died\n  exneat doctor tries the renderer") from error
     finally:
+        over.set()
         pool.shutdown(cancel_futures=True)
 
 
@@ -100,24 +103,25 @@ def _moment(scene: Scene, k: int) -> _Moment:
 
 
 _painter: Any = None
+_over: Any = None
 
 
-def _prepare(looks: Sequence[_Look], size: tuple[int, int]) -> None:
-    """Open cameras in a process that draws."""
+def _prepare(looks: Sequence[_Look], size: tuple[int, int], over: Event) -> None:
+    """Open cameras in a process that draws until it is `over`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that began it hears it
     from exneat_cli.analysis.film import BAR, Panel
 
-    global _painter
+    global _painter, _over
     cameras, panels, room = [], [], (size[0], size[1] - 2 * BAR)
     for look in looks:
         assert isinstance(look.task, HasPicture)
         cameras.append(look.task.camera(*room))
         panels.append(look.champion and Panel(look.champion, look.nodes, *size))
-    _painter = functools.partial(_paint, looks, cameras, panels, room)
+    _painter, _over = functools.partial(_paint, looks, cameras, panels, room), over
 
 
 def _draw(moments: Sequence[Sequence[_Moment]]) -> list[NDArray[np.uint8]]:
-    return [_painter(each) for each in moments]
+    return [_painter(each) for each in moments if not _over.is_set()]
 
 
 def _paint(

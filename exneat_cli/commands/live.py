@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import threading
 from collections.abc import Generator
 from contextlib import closing
@@ -37,20 +39,22 @@ body { margin: 1em; font: 16px sans-serif; background: #fff; color: #222; }
 <script>
 const [stage, play, where, words] = ["stage", "play", "where", "words"].map(name => document.getElementById(name));
 const last = LAST, period = PERIOD;
-let next = 0, playing = true;
+let next = 0, playing = true, moved = () => {};
 const pause = milliseconds => new Promise(done => setTimeout(done, milliseconds));
 play.onclick = () => { playing = !playing; play.textContent = playing ? "Pause" : "Play"; };
-where.oninput = () => { next = +where.value; };
+where.oninput = () => { next = +where.value; moved(); };
 async function run() {
   for (let shown = -1; ; ) {
     if (next === shown) { await pause(30); continue; }
     const begun = performance.now(), k = next, picture = new Image();
+    const slow = setTimeout(() => { words.textContent = `frame ${k + 1} of ${last + 1} is being drawn`; }, 500);
     picture.src = `frames/${k}.jpg`;
-    try { await picture.decode(); } catch {
+    try { await Promise.race([picture.decode(), new Promise(done => { moved = done; })]); } catch {
       words.textContent = "no answer: exneat watch has ended, or still draws";
       await pause(1000);
       continue;
-    }
+    } finally { clearTimeout(slow); }
+    if (next !== k || !picture.complete) { picture.src = ""; continue; }
     stage.replaceChildren(picture);
     shown = k;
     words.textContent = `frame ${k + 1} of ${last + 1}`;
@@ -102,7 +106,7 @@ def show(frames: Generator[NDArray[np.uint8]], count: int, fps: float, port: int
 
     film = _Film(count, fps)
     try:
-        server = ThreadingHTTPServer((HOST, port), _handler_of(film))
+        server = _Server((HOST, port), _handler_of(film))
     except OSError as error:
         raise ConfigError("port", f"one that is free ({error.strerror})", port, "port=0 takes any") from error
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -112,20 +116,27 @@ def show(frames: Generator[NDArray[np.uint8]], count: int, fps: float, port: int
             for frame in frames:
                 film.add(as_jpeg(frame))
         threading.Event().wait()
-    except KeyboardInterrupt:
-        pass  # the way to end it
+    except KeyboardInterrupt:  # the way to end it
+        print("exneat: the page has ended", flush=True)
     finally:
         server.shutdown()
         server.server_close()
 
 
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that went away."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
 def _handler_of(film: _Film) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
-            number = self.path.removeprefix("/frames/").removesuffix(".jpg")
+            asked = re.fullmatch("/frames/([0-9]{1,7})[.]jpg", self.path)
             if self.path == "/":
                 self._answer(film.page, "text/html; charset=utf-8")
-            elif number.isdecimal() and int(number) < film.count and (frame := film.frame(int(number))):
+            elif asked and int(asked[1]) < film.count and (frame := film.frame(int(asked[1]))):
                 self._answer(frame, "image/jpeg")
             else:
                 self.send_error(404)

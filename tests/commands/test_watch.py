@@ -6,8 +6,12 @@ import os
 import re
 import shutil
 import signal
+import socket
+import struct
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +29,7 @@ from exneat_cli.errors import ExneatError
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.video import VIDEO_FORMATS
-from exneat_cli.runs import record_champion
+from exneat_cli.runs import Scene, record_champion
 from tests.commands.refusals import check_refusal
 
 FFMPEG = "pip install 'exneat[video]'"
@@ -169,14 +173,23 @@ def test_a_picture_of_any_shape_fits_in_without_being_stretched() -> None:
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (40, 79, 0, 159)
 
 
+def leave(port: int, asked: bytes) -> None:
+    """Ask, and be gone before the answer, as a closed tab is."""
+    with socket.create_connection(("127.0.0.1", port)) as browser:
+        browser.sendall(asked)
+        browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+
 def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: Path) -> None:
     run = run_of(runs, "foraging/exneat-*-s0-*")
     script = "import sys\nfrom exneat_cli.main import main\nif __name__ == '__main__': sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", script, "watch", f"run={run}", "live=true", "width=160", "height=120"]
     environment = {**os.environ, "PYTHONPATH": str(Path(exneat_cli.__file__).parents[1])}
-    with subprocess.Popen([*command, "workers=1"], stdout=subprocess.PIPE, env=environment, text=True) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*command, "workers=1"], stdout=pipe, stderr=pipe, env=environment, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
         try:
-            assert process.stdout is not None
             address = process.stdout.readline().split()[0]
             assert address.startswith("http://127.0.0.1:")
             with urlopen(address) as page:
@@ -185,14 +198,48 @@ def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: P
             assert not re.findall(r"(?:src|href)=.?(?:https?:)?//", text), "it would ask the network"
             with urlopen(f"{address}/frames/9.jpg") as frame, Image.open(frame) as picture:
                 assert picture.size == (320, 120)
-            for absent in ("frames/10.jpg", "frames/-1.jpg", "frames/../../etc/passwd"):
+            for absent in ("frames/10.jpg", "frames/-1.jpg", "frames/../../etc/passwd", f"frames/{'9' * 5000}.jpg"):
                 with pytest.raises(HTTPError, match="404"):
                     urlopen(f"{address}/{absent}")
-            port = address.rpartition(":")[2]
+            port = int(address.rpartition(":")[2])
+            for asked in (b"GET", b"GET /frames/0.jpg HTTP/1.0\r\n\r\n"):
+                leave(port, asked)
             assert main(["watch", f"run={run}", "live=true", f"port={port}", "steps=1", "workers=1"]) == 2
         finally:
             process.send_signal(signal.SIGINT)
+        assert (process.stdout.read(), process.stderr.read()) == ("exneat: the page has ended\n", "")
     assert process.returncode == 0
+
+
+class Slow:
+    """A task whose camera notes what it draws, and waits at the tenth picture for a file."""
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+
+    def snapshot(self, world: Any) -> Any:
+        return world
+
+    def camera(self, width: int, height: int) -> Slow:
+        return self
+
+    def draw(self, snapshot: int) -> np.ndarray:
+        (self._place / str(snapshot)).touch()
+        while snapshot == 9 and not (self._place / "go on").exists():
+            time.sleep(0.01)
+        return np.zeros((18, 64, 3), np.uint8)
+
+
+def test_a_film_that_is_interrupted_draws_no_more_than_the_frame_at_hand(tmp_path: Path) -> None:
+    count = 5 * drawing.PORTION
+    scene = Scene(Slow(tmp_path), None, "slow", [], list(range(count)), np.zeros((count, 0)), [""] * count, 4.0)  # type: ignore[arg-type]
+    frames = drawing.drawn([scene], (64, 64), False, 1)
+    next(frames)
+    while not (tmp_path / "9").exists():
+        time.sleep(0.01)
+    threading.Timer(0.5, (tmp_path / "go on").touch).start()
+    frames.close()
+    assert {path.name for path in tmp_path.iterdir()} == {*map(str, range(10)), "go on"}
 
 
 BAD = {
