@@ -22,6 +22,8 @@ from exneat_cli.records import HistoryRow, Result, RunDirectory, dotted
 TRACKERS = ("tensorboard", "wandb", "mlflow")
 """What ``tracker=`` may be, each with a file, a library and an extra of that name."""
 
+_HALF = 120  # letters
+
 
 class Tracker(Protocol):
     """One run in one tool, in the same place whenever the run is gone on with."""
@@ -90,7 +92,9 @@ class Tracking:
             yield
         except Exception as error:  # of a library that talks to a server, or of a disk
             self._trackers.pop(name, None)
-            why = (str(error).strip() or type(error).__name__).splitlines()[0][:200]
+            why = (str(error).strip() or type(error).__name__).splitlines()[0]
+            if len(why) > 2 * _HALF:  # what went wrong stands at the beginning, and why at the end
+                why = f"{why[:_HALF]} ... {why[-_HALF:]}"
             print(f"exneat: {self._title}: tracker={name} gave up, the run goes on: {why}", file=sys.stderr)
 
 

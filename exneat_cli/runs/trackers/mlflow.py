@@ -18,8 +18,13 @@ from exneat_cli.records import HistoryRow, RunDirectory, configuration_hash, dot
 
 _TAG = "exneat.run"
 _MOST_PARAMS, _LONGEST_PARAM = 100, 500  # in one request, which MLflow sets
-_LOCAL = {"MLFLOW_ALLOW_FILE_STORE": "true"}
-"""Files suffice where there is no server; newer versions of MLflow want to be told so."""
+_DEFAULTS = {
+    "MLFLOW_ALLOW_FILE_STORE": "true",  # newer versions of MLflow want to be told that files suffice without a server
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "3",
+    "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
+}
+"""Unless the user has set them. MLflow itself would hold up a run for four minutes over a server that is gone, and for
+a quarter of an hour over one that does not answer; this is 12 s and a minute and a half."""
 
 
 class OneRun:
@@ -27,7 +32,7 @@ class OneRun:
 
     def __init__(self, run: RunDirectory, settings: Mapping[str, Any], history: Sequence[HistoryRow]) -> None:
         local = (run.path.parent.parent / "mlruns").absolute().as_uri()
-        for name, value in _LOCAL.items():
+        for name, value in _DEFAULTS.items():
             os.environ.setdefault(name, value)
         self._client = MlflowClient(os.environ.get("MLFLOW_TRACKING_URI", local))
         name, mark = run.path.parent.name, configuration_hash(settings)
