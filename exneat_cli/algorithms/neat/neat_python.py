@@ -31,7 +31,7 @@ from neat.reporting import ReporterSet
 from neat.species import DefaultSpeciesSet
 
 from exneat_cli.algorithms.neat.genome import ArrayGenome
-from exneat_cli.algorithms.neat.settings import EvolutionSettings
+from exneat_cli.algorithms.neat.settings import STOCK, EvolutionSettings
 from exneat_cli.interruption import uninterrupted
 
 LARGEST_ID = 2**62
@@ -214,8 +214,7 @@ def config_text(settings: EvolutionSettings, shape: tuple[int, int, int]) -> str
 
     `shape` is inputs, initial hidden nodes and outputs. The population, which neat-python asks for too, is 100.
     """
-    ours = {"mutation": "fixed", "crossover_prob": 1.0, "parent_selection": "uniform"}
-    config = neat_config(dataclasses.replace(settings, genome="stock", **ours), 100, shape)  # type: ignore[arg-type]
+    config = neat_config(dataclasses.replace(settings, genome="stock", **STOCK), 100, shape)
     config.reproduction_type = neat.DefaultReproduction
     config.genome_config.activation_options = sorted(
         {settings.activation_default, config.genome_config.output_activation}

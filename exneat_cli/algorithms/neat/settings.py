@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from exneat_cli.algorithms.neat.genes import ACTIVATIONS
 from exneat_cli.errors import ConfigError, check_choice, check_flag, check_real, check_whole
@@ -22,6 +23,14 @@ _CHOICES = {
     "crossover": ("choose", "average"),
     "parent_selection": ("uniform", "rank"),
 }
+STOCK: dict[str, Any] = {
+    "mutation": "fixed",
+    "safe_mutation": False,
+    "crossover": "choose",
+    "crossover_prob": 1.0,
+    "parent_selection": "uniform",
+}
+"""What neat-python's own genomes do, where array genomes have a choice."""
 LEAST_SENSITIVITY = 0.05
 """In a pin's unit. One that hardly ever leaves 0 would be blown up when it does."""
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
@@ -131,14 +140,7 @@ class EvolutionSettings:
 
     def _check_together(self) -> None:
         """Refuse what only array genomes can do, and bounds that do not hold the first mutation power."""
-        ours = {
-            "mutation": "fixed",
-            "safe_mutation": False,
-            "crossover": "choose",
-            "crossover_prob": 1.0,
-            "parent_selection": "uniform",
-        }
-        for name, stock in ours.items():
+        for name, stock in STOCK.items():
             came = getattr(self, name)
             if self.genome == "stock" and came != stock:
                 raise ConfigError(f"evolution.{name}", f"{stock} with genome=stock", came, "use genome=array")

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from exneat_cli.algorithms import ARS, NEAT, RECURRENT, EvolutionSettings, from_stock
+from exneat_cli.algorithms.neat.settings import STOCK
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
 from exneat_cli.records import Score
@@ -31,6 +32,14 @@ STEPS, EPISODE = 1000, 50
 OWN_FRAMES: Any = {"frame": "part", "contact_forces": False}
 TRUNK: Any = {"wiring": Wiring(central=False, trunk="shared"), "linkage": "joints"}
 DIRECT = EvolutionSettings(initial_connection="full_direct", output_activation="clamped")
+ARRAYS: Any = {
+    "mutation": "adaptive",
+    "safe_mutation": True,
+    "crossover": "average",
+    "crossover_prob": 0.5,
+    "parent_selection": "rank",
+}
+"""What neat-python's genomes cannot do."""
 SETTINGS = {
     "NEAT on Ant": RunSettings(task=AntTask(), algorithm=NEAT()),
     "single with joints, in parts' own frames": RunSettings(task=AntTask(**OWN_FRAMES), evolution=DIRECT, **TRUNK),
@@ -166,9 +175,11 @@ def test_its_links_and_all_recurrent_nodes_are_state_and_nothing_else_is(tmp_pat
 
 @pytest.mark.parametrize("name", ["NEAT on Ant", "single with joints, in parts' own frames", "NEAT that hunts"])
 def test_neat_pythons_own_networks_act_as_ours(name: str, tmp_path: Path) -> None:
-    settings = SETTINGS[name]
-    champion = evolved(settings)
-    place = exported("neat", (settings, champion), tmp_path / "neat")
+    champion = evolved(SETTINGS[name])
+    assert ARRAYS.keys() == STOCK.keys()
+    powers: Any = {"weight_mutate_power_min": 0.001, "weight_mutate_power_max": 10.0}
+    evolution = dataclasses.replace(SETTINGS[name].evolution, **powers, **ARRAYS)
+    place = exported("neat", (dataclasses.replace(SETTINGS[name], evolution=evolution), champion), tmp_path / "neat")
     made = runpy.run_path(str(place / "networks.py"))["networks"](place)
     wired = json.loads((place / "modules.json").read_text("utf-8"))
     brains = lay_out([champion.brain()])
