@@ -41,15 +41,22 @@ const shownAs = (condition, ask) => {
 const filtered = column(1);
 const asked = performance.getEntriesByType("resource").map((entry) => entry.name.slice(0, 5));
 const width = document.documentElement.scrollWidth;
-const dark = shownAs("(prefers-color-scheme: dark)", (look) => [look("body").backgroundColor, look("body").color]);
+const ofDark = "screen and (prefers-color-scheme: dark)";
+const dark = shownAs(ofDark, (look) => [look("body").backgroundColor, look("body").color]);
 document.body.style.width = "700px";  // A4 without its margins
 const paper = shownAs("print", (look) => ({
   rows: [...table.tBodies[0].rows].filter((row) => row.getBoundingClientRect().height > 0).length,
   widest: Math.max(...[...document.querySelectorAll("table")].map((each) => each.getBoundingClientRect().width)),
   cut: look(".scroll").overflowX, afterHeading: look("h2").breakAfter, withinFigure: look("img").breakInside,
 }));
+document.body.style.width = "350px";
+const broken = shownAs("print", () => [...document.querySelectorAll("td.number")].filter((cell) => {
+  const words = document.createRange();
+  words.selectNodeContents(cell);
+  return !cell.textContent.trim().includes(" ") && words.getClientRects().length > 1;
+}).map((cell) => cell.textContent));
 document.body.dataset.found = JSON.stringify({
-  before, up, down, after, filtered, asked, width, room: innerWidth, dark, paper,
+  before, up, down, after, filtered, asked, width, room: innerWidth, dark, paper, broken,
 });
 </script>
 """
@@ -85,4 +92,5 @@ def test_the_page_is_sorted_filtered_narrow_dark_and_printed_without_network_or_
     assert ground < 150 < 600 < words
     assert found["paper"].pop("widest") <= 700
     assert found["paper"] == {"rows": 6, "cut": "visible", "afterHeading": "avoid", "withinFigure": "avoid"}
+    assert not found["broken"], "numbers that are cut in two where a table is wider than the paper"
     assert not complaints
