@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from exneat_cli.commands.command_line import CommandLine
 from exneat_cli.commands.jobs import finished_runs, name_code_of_runs
-from exneat_cli.errors import ConfigError, check_choice, check_path
-from exneat_cli.records.exports import FORMATS, export
+from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_path
+from exneat_cli.records import make_directory, write_whole
+from exneat_cli.records.exports import FORMATS, exported
 from exneat_cli.runs import load_champion, load_settings
 
 
@@ -27,8 +30,15 @@ def run(line: CommandLine) -> int:
     loaded = [
         (directory, settings := load_settings(directory), load_champion(directory, settings)) for directory in runs
     ]
+    files: dict[Path, str | bytes] = {}
     for directory, settings, champion in loaded:
         place = directory.path / "export" / FORMATS[form] if output is None else output
-        for path in export(form, champion, settings.task, settings.evolution, place):
-            print(f"Written: {path}")
+        try:
+            files |= exported(form, champion, settings.task, settings.evolution, place)
+        except ExneatError as error:
+            raise ExneatError(f"{directory.path}: {error}") from error
+    for path, content in files.items():
+        make_directory(path.parent)
+        write_whole(path, content)
+        print(f"Written: {path}")
     return 0

@@ -91,12 +91,21 @@ def test_runs_without_a_champion_or_with_one_that_does_not_fit_are_refused(
         f"run={tmp_path}/none": "no run is there",
         f"run={tmp_path}/none*": "run: expected a run directory, or a pattern that fits some",
         f"run={run_of(runs, 'random')}": "has no champion: random is a baseline",
-        f"run={linked} format=neat": "format=neat: expected modules that do not read each other",
+        f"run={linked} format=neat": f"{linked}: format=neat: expected modules that do not read each other",
         f"run={old}": "champion.json: expected format 3, got 2: another version of exneat wrote it",
         f"run={unlike}": "expected a champion of exneat-all-output, got neat",
         f"run={runs}/*neat-* output=one.py": "output: expected null for several runs",
     }.items():
         check_refusal(["export", *arguments.split()], [named], tmp_path, capfd)
+
+
+def test_one_champion_that_does_not_fit_keeps_those_of_a_pattern_from_being_written(
+    runs: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for number, variant in enumerate(("neat", "exneat-all-output")):
+        shutil.copytree(run_of(runs, variant), tmp_path / "runs" / f"{number}", ignore=lambda *_: ["export"])
+    named = [f"{tmp_path}/runs/1: format=neat: expected modules"]
+    check_refusal(["export", f"run={tmp_path}/runs/*", "format=neat"], named, tmp_path, capfd)
 
 
 def test_without_onnx_the_command_says_how_to_install_it(

@@ -18,9 +18,8 @@ from exneat_cli.algorithms import ARS, NEAT, RECURRENT, EvolutionSettings, from_
 from exneat_cli.algorithms.neat.settings import STOCK
 from exneat_cli.brains.brain import activate, lay_out, memory_size
 from exneat_cli.errors import ExneatError
-from exneat_cli.records import Score
+from exneat_cli.records import Score, exports, write_whole
 from exneat_cli.records.champion import Champion, Genome, Scores, read_champion
-from exneat_cli.records.exports import export
 from exneat_cli.rollouts import Executor, Noise, Runner
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.seeding import generator, shared_episodes
@@ -124,7 +123,9 @@ def ours(settings: RunSettings, champion: Champion) -> np.ndarray:
 
 def exported(form: str, case: tuple[RunSettings, Champion], place: Path) -> Path:
     settings, champion = case
-    export(form, champion, settings.task, settings.evolution, place)
+    for path, content in exports.exported(form, champion, settings.task, settings.evolution, place).items():
+        path.parent.mkdir(exist_ok=True)
+        write_whole(path, content)
     return place
 
 
