@@ -44,3 +44,8 @@ def widened(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     wide = np.zeros(shape, values.dtype)
     wide[tuple(map(slice, values.shape))] = values
     return wide
+
+
+def grown(array: Any, shape: tuple[int, ...]) -> Any:
+    """A larger array on the current device; what is there stays, and zeros are behind it."""
+    return wp.array(widened(array.numpy(), shape), dtype=array.dtype)

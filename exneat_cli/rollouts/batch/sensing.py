@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from exneat_cli.rollouts.batch.kernels import Doing
-from exneat_cli.rollouts.batch.mirrored import widened
+from exneat_cli.rollouts.batch.mirrored import grown
 from exneat_cli.tasks import RUNNING
 
 wp.set_module_options({"enable_backward": False})
@@ -74,7 +74,7 @@ class Sensing:
     def make_room(self, places: int) -> None:
         """Enlarge what each slot has; what is there stays."""
         slots, _, size = self._ended[0].shape
-        self._ended = [wp.array(widened(each.numpy(), (slots, places, size))) for each in self._ended]
+        self._ended = [grown(each, (slots, places, size)) for each in self._ended]
 
     def of(self, slot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(places, sensed) means and sums of squared deviations of a slot."""

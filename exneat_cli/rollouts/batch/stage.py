@@ -18,7 +18,7 @@ from exneat_cli.brains.batch import activate, packed
 from exneat_cli.brains.brain import memory_size
 from exneat_cli.rollouts.batch import kernels
 from exneat_cli.rollouts.batch.kernels import IDLE, Doing, Jobs, Outcome
-from exneat_cli.rollouts.batch.mirrored import Mirrored, widened
+from exneat_cli.rollouts.batch.mirrored import Mirrored, grown, widened
 from exneat_cli.rollouts.batch.sensing import Sensing
 from exneat_cli.rollouts.episode import Tally
 from exneat_cli.seeding import EpisodeSeeds
@@ -154,7 +154,7 @@ class Stage:
             self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
             self._graph = None
         if memory > self._memory.shape[1]:
-            self._memory = _grown(self._memory, (self._memory.shape[0], _ample(memory)))
+            self._memory = grown(self._memory, (self._memory.shape[0], _ample(memory)))
             self._graph = None
         if episodes > self._episodes:
             self._grow_episodes(episodes)
@@ -162,7 +162,7 @@ class Stage:
         if jobs > self._outcome.status.shape[1]:
             for name in ("status", "steps", "totals"):
                 array = getattr(self._outcome, name)
-                setattr(self._outcome, name, _grown(array, (slots, _ample(jobs), *array.shape[2:])))
+                setattr(self._outcome, name, grown(array, (slots, _ample(jobs), *array.shape[2:])))
             if self._sensing is not None:
                 self._sensing.make_room(_ample(jobs))
             self._grow_queue(slots * _ample(jobs))
@@ -198,7 +198,3 @@ def _struct(struct: Any, shape: Any, dtype: type, *names: str) -> Any:
 def _ample(size: int) -> int:
     """Room for some growth: genomes get larger from generation to generation."""
     return size + size // 4 + 16
-
-
-def _grown(array: Any, shape: tuple[int, ...]) -> Any:
-    return wp.array(widened(array.numpy(), shape), dtype=array.dtype)
