@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,12 @@ def modules() -> list[tuple[str, Path]]:
         if room not in ("__init__", *FREE):
             found.append((room, path))
     return found
+
+
+def test_no_files_need_each_other() -> None:
+    paths = [path for path in sorted(PACKAGE.rglob("*.py")) if path.stem != "__init__"]
+    names = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in paths}
+    TopologicalSorter({name: names.keys() & set(imports_of(path)) for name, path in names.items()}).prepare()
 
 
 def test_every_file_stands_in_a_room() -> None:

@@ -1,4 +1,4 @@
-"""Drawing the frames of films in processes of their own, and the renderer that they need."""
+"""Drawing the frames of films in processes of their own, the renderer that they need, and the film after training."""
 
 from __future__ import annotations
 
@@ -18,12 +18,17 @@ from numpy.typing import NDArray
 
 from exneat_cli.commands.doctor import FRAME, said_by
 from exneat_cli.errors import ExneatError
+from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion
-from exneat_cli.runs import Scene
+from exneat_cli.records.video import check_video_library, write_video
+from exneat_cli.rollouts import Executor
+from exneat_cli.runs import Scene, load_settings, record_champion
 from exneat_cli.tasks import HasPicture, Task
 
 PORTION = 8
 """Frames that a process draws at a time."""
+SHORT = 200
+"""Control steps of a film that training makes."""
 
 
 def choose_renderer() -> None:
@@ -47,6 +52,22 @@ def choose_renderer() -> None:
     raise ExneatError(
         f"watch: expected a renderer for MuJoCo, got none ({', '.join(map(str, choices))}): {why}\n  {fix}"
     )
+
+
+def film_champion(directory: RunDirectory) -> None:
+    """Film the champion of a finished run for its plots, the first `SHORT` steps, unless it was filmed before.
+
+    Raises:
+        ExneatError: there is no renderer or no ffmpeg, or the task has no pictures.
+    """
+    path = directory.plots / "champion.mp4"
+    if path.exists():
+        return
+    check_video_library()
+    if load_settings(directory).task.drawn_by_mujoco:
+        choose_renderer()
+    scene = record_champion(directory, episode=0, seed=None, sweep=None, steps=SHORT, fps=None)
+    write_video(path, drawn([scene], (640, 480), True, Executor().threads), scene.fps, "mp4")
 
 
 class _Look(NamedTuple):

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from exneat_cli.commands.command_line import CommandLine
+from exneat_cli.commands.drawing import film_champion
 from exneat_cli.commands.setting import as_written
 from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_flag, check_keys, check_path, check_section
 from exneat_cli.records import RunDirectory, runs_at
@@ -63,8 +64,6 @@ class Job:
 
     def _film(self, directory: RunDirectory) -> None:
         """Film the champion, unless it was filmed before; whatever is missing for that costs a line, not the run."""
-        from exneat_cli.commands.watch import film_champion
-
         try:
             film_champion(directory)
         except ExneatError as error:

@@ -15,8 +15,6 @@ from exneat_cli.records.video import VIDEO_FORMATS, check_video_library, write_v
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import load_settings, record_champion
 
-SHORT = 200
-"""Control steps of a film that training makes."""
 _KEYS = (
     *("run", "format", "panel", "episode", "seed", "level", "steps", "fps", "width", "height", "workers", "output"),
     *("live", "port"),
@@ -55,22 +53,6 @@ def run(line: CommandLine) -> int:
     count = write_video(path, frames, fps, form)
     print(f"Written: {path} ({count} frames, {count / fps:.1f} s)")
     return 0
-
-
-def film_champion(directory: RunDirectory) -> None:
-    """Film the champion of a finished run for its plots, the first `SHORT` steps, unless it was filmed before.
-
-    Raises:
-        ExneatError: there is no renderer or no ffmpeg, or the task has no pictures.
-    """
-    path = directory.plots / "champion.mp4"
-    if path.exists():
-        return
-    check_video_library()
-    if load_settings(directory).task.drawn_by_mujoco:
-        choose_renderer()
-    scene = record_champion(directory, episode=0, seed=None, sweep=None, steps=SHORT, fps=None)
-    write_video(path, drawn([scene], (640, 480), True, Executor().threads), scene.fps, "mp4")
 
 
 def _check(plain: Mapping[str, Any]) -> None:
