@@ -26,11 +26,11 @@ HERE = Path(__file__).parent
 RULE = "linear_fusion"
 """The baseline that a trained variant should beat."""
 SHOWN = ("training", "training_runs", "robustness", "cluster")
-"""Kinds of figures that rows suffice for and that the page shows."""
+"""Kinds of figures that can be drawn from rows and are shown on the page."""
 
 
 def published_studies(nowhere: str) -> dict[str, Study]:
-    """Experiments with published rows, each at the largest budget that has any; runs are looked for in `nowhere`."""
+    """Experiments with published rows, each at its largest published budget; runs are looked for in `nowhere`."""
     studies = {}
     for name in shipped_files("experiments"):
         rows = read_published(results_file(name))
@@ -43,7 +43,7 @@ def published_studies(nowhere: str) -> dict[str, Study]:
 
 
 def verdicts(study: Study) -> Iterator[str]:
-    """What holds, what does not and what cannot be told, from champions on test episodes."""
+    """What holds, where the opposite holds and what is inconclusive, from champions on test episodes."""
     trained = [name for name in study.trained_variants if study.reference_of(name) != name]
     found: dict[tuple[str, str], list[str]] = {}
     for condition, label in study.conditions.items():
@@ -54,11 +54,11 @@ def verdicts(study: Study) -> Iterator[str]:
             if not values[name] or not values[study.reference_of(name)]:
                 continue
             margin, p, a12 = (float(table.loc[name, each]) for each in ("margin", "p_holm", "a12"))  # type: ignore[arg-type]
-            kind = "cannot be told" if not p < SIGNIFICANT else "holds" if margin > 0 else "does not hold"
+            kind = "inconclusive" if not p < SIGNIFICANT else "holds" if margin > 0 else "the opposite holds"
             found.setdefault((name, kind), []).append(f"{label} ({margin:+.3g}, p {p:.2g}, A12 {a12:.2f})")
     for name in trained:
         what = f"{study.variants[name]} beats {study.variants[study.reference_of(name)]}"
-        for kind in ("holds", "does not hold", "cannot be told"):
+        for kind in ("holds", "the opposite holds", "inconclusive"):
             if (name, kind) in found:
                 yield f"{what}: **{kind}** in {'; '.join(found[name, kind])}."
     yield from beyond_the_rule(study)
@@ -66,11 +66,11 @@ def verdicts(study: Study) -> Iterator[str]:
 
 
 def beyond_the_rule(study: Study) -> Iterator[str]:
-    """Where learning adds something to a rule that nothing trains, and where it does not."""
+    """Where trained variants score above an untrained rule, and where they do not."""
     if RULE not in study.variants:
         return
     for name in study.trained_variants:
-        kinds = ("learning adds to", "**learning adds nothing** to", "learning **falls short** of")
+        kinds = ("above", "**not clearly above**", "**below**")
         found: dict[str, list[str]] = {kind: [] for kind in kinds}
         for condition, label in study.conditions.items():
             here = study.results[study.results["condition"] == condition]
@@ -82,11 +82,11 @@ def beyond_the_rule(study: Study) -> Iterator[str]:
                 found[kinds[0 if low > 0 else 2 if high < 0 else 1]].append(said)
         for words, places in found.items():
             if places:
-                yield f"{study.variants[name]}: {words} what linear fusion reaches untrained, in {'; '.join(places)}."
+                yield f"{study.variants[name]}: {words} untrained linear fusion in {'; '.join(places)}."
 
 
 def before_learning(study: Study) -> Iterator[str]:
-    """What the best team of the random first generation has in training already, beside the best of all generations."""
+    """Training scores of the best team of the random first generation, and of the best team of all generations."""
     best: dict[str, list[tuple[float, float]]] = {}
     for condition in study.conditions:
         if not (study.results["condition"] == condition).any():
@@ -96,8 +96,8 @@ def before_learning(study: Study) -> Iterator[str]:
             best.setdefault(str(name), []).append((runs.first().mean(), runs.last().mean()))
     for name in filter(best.__contains__, study.trained_variants):
         first, last = zip(*best[name], strict=True)
-        chance = f"the best team of the random first generation earns {_range(first)} in training"
-        yield f"{study.variants[name]}: {chance}, the best of all generations {_range(last)}."
+        chance = f"in training, the best team of the random first generation earns {_range(first)}"
+        yield f"{study.variants[name]}: {chance}, and the best of all generations {_range(last)}."
 
 
 def _range(values: Sequence[float]) -> str:
