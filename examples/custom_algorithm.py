@@ -1,8 +1,8 @@
-"""An algorithm of one's own: a (1 + lambda) evolution strategy that changes nothing but weights.
+"""A custom algorithm: a (1 + lambda) evolution strategy that changes only weights.
 
     python examples/custom_algorithm.py train --config-dir examples/conf task=track_maze algorithm=hill_climber
 
-This file is the program exneat with one algorithm more; conf/algorithm/hill_climber.yaml beside it holds its settings.
+This file is the program exneat with one additional algorithm; its settings are in conf/algorithm/hill_climber.yaml.
 Source: Rechenberg, "Evolutionsstrategie", 1973, without adaptation of the step size.
 """
 
@@ -38,7 +38,7 @@ class HillClimber(Algorithm):
 
     Attributes:
         name: always ``hill_climber``.
-        sigma: sd of what a child adds to each weight, at least 0.
+        sigma: sd of the change that a child makes to each weight, at least 0.
 
     Raises:
         ConfigError: a value is out of range.
@@ -52,12 +52,12 @@ class HillClimber(Algorithm):
         check_real("algorithm.sigma", self.sigma, 0.0)
 
     def start(self, problem: Problem) -> Search:
-        """Begin with one of the teams that ExNEAT begins with."""
+        """Begin with one of the teams with which ExNEAT begins."""
         (first, *_), _ = ExNEAT().start(dataclasses.replace(problem, population=2)).ask()
         return Climb(problem, self.sigma, first)
 
     def restored(self, problem: Problem, state: State) -> Search:
-        """Go on from a checkpoint."""
+        """Resume from a checkpoint."""
         plain, columns = state
         (parent,) = unpack_teams(columns, "parent", problem)
         climb = Climb(problem, self.sigma, parent)
@@ -68,12 +68,12 @@ class HillClimber(Algorithm):
 
 
 class Climb(Search):
-    """The best team so far, and children around it.
+    """Searches around the best team so far, by children with changed weights.
 
     Args:
-        problem: see there.
+        problem: what to search for, see `Problem`.
         sigma: see `HillClimber`.
-        parent: the team to begin with.
+        parent: the first team.
     """
 
     def __init__(self, problem: Problem, sigma: float, parent: Team) -> None:
@@ -83,12 +83,12 @@ class Climb(Search):
         self.fitness: float | None = None
 
     def ask(self) -> tuple[list[Team], int]:
-        """The parent, in the new episodes of this generation, and its children."""
+        """The parent, evaluated again in the episodes of this generation, and its children."""
         self.teams = [self.parent, *(self._child(k) for k in range(1, self.problem.population))]
         return self.teams, self.problem.episodes
 
     def tell(self, results: Results) -> bool:
-        """Go on from the best; a generation is one turn."""
+        """Continue from the best team; each call ends a generation."""
         if not results.failed.all():
             fitness = np.where(results.failed, -np.inf, results.fitness.mean(axis=1))
             best = int(fitness.argmax())
@@ -101,7 +101,7 @@ class Climb(Search):
         return [] if self.fitness is None else [Candidate(self.parent, self.fitness, self.generation - 1)]
 
     def state(self) -> State:
-        """The parent and the random numbers to come."""
+        """The parent, and the state of the random numbers."""
         plain = {"rng": self.rng.bit_generator.state, "generation": self.generation, "fitness": self.fitness}
         return plain, pack_teams([self.parent], "parent")
 

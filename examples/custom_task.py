@@ -1,8 +1,8 @@
-"""A task of one's own: a corridor with a lamp at one end, which two modules learn to walk to.
+"""A custom task: a corridor with a lamp at one end, to which two modules learn to walk.
 
     python examples/custom_task.py train --config-dir examples/conf task=corridor
 
-This file is the program exneat with one task more; conf/task/corridor.yaml beside it holds the task's settings.
+This file is the program exneat with one additional task; its settings are in conf/task/corridor.yaml.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from exneat_cli.tasks import ENDED, RUNNING, TASKS, Part, Simulation, Task
 
 
 class World(NamedTuple):
-    """What the functions below share: brightness of each tile; the agent's tile and the steps that it has taken."""
+    """State shared by the functions below: the brightness of each tile; the agent's tile and its number of steps."""
 
     light: NDArray[np.float64]
     agent: NDArray[np.int64]
 
 
 def reset(world: World, rng: Generator) -> None:
-    """Put the lamp to the left or the right end."""
+    """Put the lamp at the left or the right end."""
     tiles = np.arange(len(world.light))
     lamp = tiles[0] if rng.random() < 0.5 else tiles[-1]
     world.light[:] = 1.0 / (1.0 + np.abs(tiles - lamp))
@@ -35,7 +35,7 @@ def reset(world: World, rng: Generator) -> None:
 
 
 def rewind(world: World) -> None:
-    """Put the agent back into the middle."""
+    """Put the agent back in the middle."""
     world.agent[:] = len(world.light) // 2, 0
 
 
@@ -46,7 +46,7 @@ def observe(world: World, readings: NDArray[np.float64]) -> None:
 
 
 def step(world: World, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
-    """Move to the side of the larger value; pay the brightness once the agent is at an end, or too late."""
+    """Move to the side with the larger value; reward the brightness when the agent is at an end or out of time."""
     world.agent[0] += np.sign(action[1] - action[0])
     world.agent[1] += 1
     tile, steps = world.agent
@@ -62,7 +62,7 @@ class Corridor(Task):
 
     Attributes:
         name: always ``corridor``.
-        length: tiles, 3 to 99.
+        length: number of tiles, 3 to 99.
 
     Raises:
         ConfigError: a value is out of range.

@@ -1,8 +1,8 @@
-"""Run a champion without exneat: its champion.json and NumPy are enough.
+"""Run a champion without exneat: all that is needed is its champion.json and NumPy.
 
     python examples/run_champion.py outputs/ant/<run>/champion.json
 
-walks Gymnasium's Ant for one episode. What each field of the file means: docs/champion.md.
+makes Gymnasium's Ant walk for one episode. docs/champion.md explains each field of the file.
 """
 
 import json
@@ -15,7 +15,7 @@ ACTIVATIONS |= {"sigmoid": lambda z: 1.0 / (1.0 + np.exp(-np.clip(5.0 * z, -60.0
 
 
 class Champion:
-    """A team of networks, from the content of champion.json; make a new one for every episode."""
+    """A team of networks, from the content of champion.json; create a new one for every episode."""
 
     def __init__(self, file):
         self.plan, self.recurrent, self.values = file["plan"], not file["feed_forward"], {}
@@ -23,15 +23,15 @@ class Champion:
         self.nodes = {(m, node["id"]): (node, g["connections"]) for m, g in enumerate(genomes) for node in g["nodes"]}
 
     def act(self, sensed):
-        """One step: from what is sensed to the action, both sequences of numbers."""
+        """One step: from the sensed values to the action, both sequences of numbers."""
         self.sensed, self.before, self.values = sensed, self.values, {}
         action = np.zeros(self.plan["action_size"])
-        for m, k in self.nodes:  # node k is output k where the module has so many, and drives nothing else
+        for m, k in self.nodes:  # the first nodes of a module are its outputs; the others drive nothing
             action[self.plan["modules"][m]["drives"][k : k + 1]] = self.read(m, k, old=False)
         return action
 
     def read(self, m, k, old):
-        """What node k of module m, or its pin -1 - k, holds now, or if `old` held at the end of the last step."""
+        """The value of node k of module m, or of its pin -1 - k: now, or with `old` at the end of the last step."""
         if k < 0:
             pin = self.plan["modules"][m]["pins"][-1 - k]
             if pin["module"] < 0:
@@ -46,7 +46,7 @@ class Champion:
 
 
 def walk(path, steps=1000):
-    """Let a champion of task=ant walk for an episode; returns its forward reward."""
+    """Let a champion of task=ant walk for one episode and return its forward reward."""
     import gymnasium
 
     with open(path, encoding="utf-8") as file:
