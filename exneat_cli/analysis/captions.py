@@ -38,13 +38,13 @@ def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[st
         yield f"{'; '.join(meanings).capitalize()}."
     if study.fitness_name != "fitness":
         yield f"Fitness is {study.fitness_name}."
-    yield "Mean and interquartile mean (IQM) are over runs, and so is the 95% bootstrap interval of the mean."
+    yield "Mean, interquartile mean (IQM) and the 95% bootstrap interval of the mean are over runs."
     learned = lines[lines["variant"].isin(study.trained_variants) & (lines["runs"] > 0)]
     yield few_runs_sentence(learned["runs"])
     yield _least_p_sentence(study, learned)
     yield f"{_references_sentence(study, variants)}: margin is the difference of the means."
-    yield "p: two-sided Mann-Whitney U test, Holm-corrected over the variants of a condition that are compared."
-    yield "A12: chance that a run of the variant beats a run of its reference, a tie counting half."
+    yield "p: two-sided Mann-Whitney U test, Holm-corrected over the compared variants of a condition."
+    yield "A12: probability that a run of the variant beats a run of its reference, with ties counting half."
     if "efficiency" in quantities:
         reached = "first generation, counted from 1, at which the mean best so far reaches the final mean of"
         yield f"Efficiency: {reached} the reference."
@@ -74,7 +74,7 @@ def _least_p_sentence(study: Study, learned: pd.DataFrame) -> str:
     if not least or max(least.values()) < SIGNIFICANT:
         return ""
     fewest = max(least, key=lambda pair: (least[pair], pair))
-    return f"{fewest[0]} runs against {fewest[1]} cannot reach a p below {least[fewest]:.2g}, whatever they give."
+    return f"With {fewest[0]} runs against {fewest[1]}, p cannot be below {least[fewest]:.2g}, whatever the results."
 
 
 def _margins_sentence(study: Study, learned: pd.DataFrame) -> str:

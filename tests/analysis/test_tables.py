@@ -91,7 +91,7 @@ def test_what_a_baseline_reaches_can_be_taken_away(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("seeds", "said"), [(3, True), (4, False)])
 def test_too_few_runs_for_any_p_are_named(tmp_path: Path, seeds: int, said: bool) -> None:
     table = built(finish_all(plan_study(tmp_path, seeds=seeds)), tmp_path, PLAIN)
-    assert ("3 runs against 3 cannot reach a p below 0.1, whatever they give." in table.caption) == said
+    assert ("With 3 runs against 3, p cannot be below 0.1, whatever the results." in table.caption) == said
 
 
 def test_efficiency_is_when_the_mean_of_runs_reaches_that_of_the_first_variant_if_ever(tmp_path: Path) -> None:
