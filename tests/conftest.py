@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 import pytest
 
-from exneat_cli.algorithms import RECURRENT, EvolutionSettings
+from tests.commands.figures import without_figures
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -17,11 +18,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def ant_settings() -> EvolutionSettings:
-    return EvolutionSettings()
-
-
-@pytest.fixture
-def grid_settings() -> EvolutionSettings:
-    """The settings of the grid worlds."""
-    return RECURRENT
+def no_figures() -> Iterator[None]:
+    """See `without_figures`."""
+    with without_figures():
+        yield

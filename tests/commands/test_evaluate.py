@@ -15,6 +15,7 @@ from exneat_cli.main import main
 from exneat_cli.records import RobustnessRow, RunDirectory, read_robustness
 from exneat_cli.rollouts import Noise, perturbed
 from exneat_cli.tasks import TASKS
+from tests.commands.figures import without_figures
 from tests.commands.refusals import check_refusal
 
 SWEEPS = sorted(path.stem for path in (shipped_directory("conf") / "sweep").glob("*.yaml") if path.stem != "none")
@@ -23,8 +24,9 @@ SWEEPS = sorted(path.stem for path in (shipped_directory("conf") / "sweep").glob
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("outputs")
-    for algorithm in ("neat", "random", "motionless", "linear_fusion"):
-        assert main(["train", "task=track_maze", "budget=smoke", f"algorithm={algorithm}", f"output={output}"]) == 0
+    with without_figures():
+        for algorithm in ("neat", "random", "motionless", "linear_fusion"):
+            assert main(["train", "task=track_maze", "budget=smoke", f"algorithm={algorithm}", f"output={output}"]) == 0
     return output / "track_maze"
 
 
@@ -34,7 +36,8 @@ def rows_of(runs: Path, variant: str) -> list[RobustnessRow]:
 
 
 def evaluate(*arguments: str) -> int:
-    return main(["evaluate", "sweep.episodes=3", *arguments])
+    with without_figures():
+        return main(["evaluate", "sweep.episodes=3", *arguments])
 
 
 def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,15 +47,14 @@ def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pyt
         assert [row.level for row in rows if row.parameter == "gap"] == [0, 1, 2, 3, 4, 5]
         assert len([row for row in rows if row.parameter == "sensor_noise"]) == 11
         assert {row.episodes for row in rows if row.parameter != "none"} == {3}
-    before = {path: path.read_bytes() for path in runs.rglob("robustness.*")}
-    assert len([path for path in before if path.suffix == ".svg"]) == 4
+    before = {path: path.read_bytes() for path in runs.rglob("robustness.csv")}
     capsys.readouterr()
     assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
     told = capsys.readouterr().out
     assert told.count("all there already") == 4
     for row in rows_of(runs, "neat"):
         assert re.search(rf"^ *{row.level:g}  +{row.fitness_mean:.4g}  +{row.fitness_std:.3g}$", told, re.MULTILINE)
-    assert {path: path.read_bytes() for path in runs.rglob("robustness.*")} == before
+    assert {path: path.read_bytes() for path in runs.rglob("robustness.csv")} == before
 
 
 def test_other_levels_join_those_that_are_there(runs: Path) -> None:
@@ -65,7 +67,7 @@ def test_other_levels_join_those_that_are_there(runs: Path) -> None:
 def test_rows_with_another_number_of_episodes_stand_beside_those_that_are_there(runs: Path) -> None:
     (neat,) = runs.glob("neat-*")
     for episodes in (2, 5):
-        assert main(["evaluate", f"run={neat}", "sweep=gap", "sweep.levels=[5]", f"sweep.episodes={episodes}"]) == 0
+        assert evaluate(f"run={neat}", "sweep=gap", "sweep.levels=[5]", f"sweep.episodes={episodes}") == 0
     assert {row.episodes for row in rows_of(runs, "neat") if (row.parameter, row.level) == ("gap", 5)} >= {2, 5}
 
 
@@ -79,6 +81,13 @@ def test_without_noise_fusion_is_perfect_and_standing_still_gets_a_quarter(runs:
     assert clean["motionless"].fitness_mean == 0.25
 
 
+def test_figures_that_a_tested_run_lacks_are_drawn(runs: Path) -> None:
+    (rule,) = runs.glob("motionless-*")
+    assert main(["evaluate", f"run={rule}", "sweep=gap", "sweep.levels=[1]", "sweep.episodes=1"]) == 0
+    assert {path.name for path in (rule / "plots").glob("*.svg")} == {"path.svg", "robustness.svg"}
+
+
+@pytest.mark.usefixtures("no_figures")
 def test_training_with_a_sweep_ends_with_its_rows_and_another_sweep_does_not_train_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

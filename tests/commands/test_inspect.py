@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.main import main
+from tests.commands.figures import without_figures
 
 GRID = ("task=general_maze", "budget=smoke", "algorithm=random", "test_episodes=1")
 
@@ -27,7 +28,7 @@ def multirun(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A multirun's output root, and what it printed."""
     output, printed = tmp_path_factory.mktemp("multirun"), io.StringIO()
     varied = ("seed=0,1", "noise.sensor_std=0.0,0.2", "task.size=7,9")
-    with contextlib.redirect_stdout(printed):
+    with contextlib.redirect_stdout(printed), without_figures():
         assert main(["train", "-m", *GRID, f"output={output}", *varied]) == 0
     return output, printed.getvalue()
 

@@ -14,12 +14,12 @@ from exneat_cli.main import main
 from exneat_cli.records import PublishedRun, provenance, published_run, read_published
 from exneat_cli.runs import Progress
 
+pytestmark = pytest.mark.usefixtures("no_figures")
 SMALL = {
-    "claim": "Modules beat one network.",
+    "claim": "A network beats the rule.",
     "settings": {"task": "track_maze"},
     "variants": {
         "neat": {"label": "NEAT", "settings": {"algorithm": "neat"}},
-        "exneat": {"label": "ExNEAT", "settings": {"geometry": "single"}},
         "linear_fusion": {"label": "rule", "runs": 1, "settings": {"algorithm": "linear_fusion"}},
     },
     "conditions": {
@@ -33,9 +33,8 @@ ANEW = ("wall_seconds", "commit")
 
 
 def test_rows_are_published_as_runs_finish_and_tables_come_from_them_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
     path, results = tmp_path / "small.yaml", tmp_path / "results" / "small.csv"
     path.write_text(yaml.safe_dump(SMALL, sort_keys=False))
     sweep = ["sweep", f"experiment={path}", "budget=smoke", f"output={tmp_path / 'out'}"]
@@ -43,11 +42,11 @@ def test_rows_are_published_as_runs_finish_and_tables_come_from_them_alone(
     assert not results.exists()
     assert main([*sweep, "publish=true"]) == 0, "runs that were finished before are published at once"
     rows = read_published(results)
-    kinds = [("neat", 0), ("neat", 1), ("exneat", 0), ("exneat", 1), ("linear_fusion", 0)]
+    kinds = [("neat", 0), ("neat", 1), ("linear_fusion", 0)]
     assert [(row.condition, row.variant, row.seed) for row in rows] == [
         (c, *k) for c in ("clean", "gap") for k in kinds
     ]
-    assert [len(row.levels) for row in rows] == [0] * 5 + [6] * 5
+    assert [len(row.levels) for row in rows] == [0] * 3 + [6] * 3
     before = results.read_bytes()
     results.unlink()
     side_by_side = ["hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial"]
@@ -55,11 +54,14 @@ def test_rows_are_published_as_runs_finish_and_tables_come_from_them_alone(
     again = read_published(results)
     anew = dict.fromkeys(ANEW)
     assert [row._replace(**anew) for row in again] == [row._replace(**anew) for row in rows]
+    champions, same = (sorted((tmp_path / place).rglob("champion.json")) for place in ("out", "again"))
+    assert [path.read_bytes() for path in champions] == [path.read_bytes() for path in same]
+    assert len(champions) == 4
     results.write_bytes(before)
     capsys.readouterr()
     assert main(["report", f"experiment={path}", "budget=smoke", f"output={tmp_path / 'none'}"]) == 0
     table = (tmp_path / "none" / "report" / "small" / "comparison-small.md").read_text()
-    assert "10 of these runs are published rows" in table
+    assert "6 of these runs are published rows" in table
     assert main(["report", f"experiment={path}", "budget=smoke", f"output={tmp_path / 'out'}"]) == 0
     own = tmp_path / "out" / "report" / "small" / "comparison-small.csv"
     assert own.read_bytes() == (tmp_path / "none" / "report" / "small" / "comparison-small.csv").read_bytes()

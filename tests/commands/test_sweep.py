@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import io
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,10 +38,6 @@ SMALL = {
 }
 
 
-TWO_JOBS = {"conditions": {"gap_1": SMALL["conditions"]["gap_1"]}}  # type: ignore[index]
-"""What spares tests the jobs that they do not look at."""
-
-
 def write(folder: Path, **changes: object) -> Path:
     path = folder / "small.yaml"
     path.write_text(yaml.safe_dump({**SMALL, **changes}))
@@ -50,29 +49,46 @@ def sweep(folder: Path, *arguments: str) -> int:
     return main(["sweep", f"experiment={path}", "budget=smoke", f"output={folder / 'out'}", *arguments])
 
 
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder in which all jobs are trained, tested and drawn, and what was printed meanwhile."""
+    folder, printed = tmp_path_factory.mktemp("swept"), io.StringIO()
+    write(folder)
+    with contextlib.redirect_stdout(printed):
+        assert sweep(folder) == 0
+    return folder, printed.getvalue()
+
+
+@pytest.fixture
+def finished(swept: tuple[Path, str], tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(swept[0], tmp_path, dirs_exist_ok=True))
+
+
 def plan(folder: Path, *settings: str, name: str = "", budget: str = "smoke") -> list[Job]:
     line = read_command_line("sweep", [f"output={folder / 'out'}", *settings])
     return plan_jobs(read_experiment(name or str(folder / "small.yaml")), budget, line, ("experiment", "publish"))
 
 
 def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    swept: tuple[Path, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write(tmp_path)
-    assert sweep(tmp_path) == 0
-    assert "4 runs done, 0 skipped as finished before, 0 failed" in capsys.readouterr().out
-    folders = sorted(path.name for path in (tmp_path / "out").iterdir())
+    folder, printed = swept
+    assert "4 runs done, 0 skipped as finished before, 0 failed" in printed
+    folders = sorted(path.name for path in (folder / "out").iterdir())
     assert folders == ["small-clean-smoke", "small-gap_1-smoke"]
-    for run in (tmp_path / "out").glob("*/*"):
+    for run in (folder / "out").glob("*/*"):
         levels = [row.level for row in read_robustness(RunDirectory(run).robustness)]
         assert levels == ([0, 1, 2, 3, 4, 5] if "gap_1" in str(run) else [])
-        assert {"training.svg", "path.svg", "network.svg"} <= {path.name for path in (run / "plots").iterdir()}
-    before = contents(tmp_path / "out")
-    assert sweep(tmp_path) == 0
+        drawn = {"training", "path", "network", *(["robustness"] if levels else [])}
+        assert {path.stem for path in (run / "plots").glob("*.svg")} == drawn
+    before = contents(folder / "out")
+    assert sweep(folder) == 0
     assert "0 runs done, 4 skipped as finished before, 0 failed" in capsys.readouterr().out
-    assert contents(tmp_path / "out") == before
+    assert contents(folder / "out") == before
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_job_that_fails_leaves_the_others_alone_and_is_named_at_the_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,32 +107,14 @@ def test_a_job_that_fails_leaves_the_others_alone_and_is_named_at_the_end(
     assert "1 runs done, 3 skipped as finished before, 0 failed" in capsys.readouterr().out
 
 
-def test_a_run_that_was_trained_but_not_tested_is_finished_without_training_again(tmp_path: Path) -> None:
-    write(tmp_path, **TWO_JOBS)
-    assert sweep(tmp_path) == 0
-    (run,) = (tmp_path / "out").glob("small-gap_1-smoke/neat-*")
+def test_a_run_that_was_trained_but_not_tested_is_finished_without_training_again(finished: Path) -> None:
+    (run,) = (finished / "out").glob("small-gap_1-smoke/neat-*")
     rows = (run / "robustness.csv").read_bytes()
     history = (run / "history.csv").stat().st_mtime_ns
     (run / "robustness.csv").unlink()
-    assert sweep(tmp_path) == 0
+    assert sweep(finished) == 0
     assert (run / "robustness.csv").read_bytes() == rows
     assert (run / "history.csv").stat().st_mtime_ns == history
-
-
-def test_side_by_side_gives_the_same_bytes(tmp_path: Path) -> None:
-    pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
-    write(tmp_path, **TWO_JOBS)
-    assert sweep(tmp_path) == 0
-    (tmp_path / "out").rename(tmp_path / "one")
-    assert sweep(tmp_path, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial") == 0
-
-    def results(folder: str) -> dict[str, object]:
-        kept = ("champion.json", "robustness.csv", "trace.csv")
-        paths = [path for path in (tmp_path / folder).rglob("*") if path.name in kept]
-        return {str(path.relative_to(tmp_path / folder)): path.read_bytes() for path in paths}
-
-    assert results("out") == results("one")
-    assert len(results("one")) == 6
 
 
 def test_the_users_own_settings_win_over_the_experiments(tmp_path: Path) -> None:
@@ -155,40 +153,28 @@ def test_words_with_special_characters_arrive_as_they_are_written(tmp_path: Path
 
 
 def test_damage_in_one_run_leaves_the_others_finished_and_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    finished: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write(tmp_path, **TWO_JOBS)
-    assert sweep(tmp_path) == 0
-    (manifest,) = (tmp_path / "out").glob("small-gap_1-smoke/neat-*/manifest.json")
+    (manifest,) = (finished / "out").glob("small-gap_1-smoke/neat-*/manifest.json")
     manifest.write_text("{")
-    capsys.readouterr()
-    assert sweep(tmp_path) == 1
+    assert sweep(finished) == 1
     shown = capsys.readouterr()
-    assert "0 runs done, 1 skipped as finished before, 1 failed" in shown.out
+    assert "0 runs done, 3 skipped as finished before, 1 failed" in shown.out
     assert "gap_1/neat/0" in shown.err
     assert "expected JSON" in shown.err
 
 
-def test_a_directory_that_a_killed_job_had_only_just_made_is_no_obstacle(tmp_path: Path) -> None:
-    write(tmp_path, **TWO_JOBS)
-    for job in plan(tmp_path)[:2]:
-        job.settings.directory.path.mkdir(parents=True)
-    assert sweep(tmp_path) == 0
-
-
-def test_figures_that_are_missing_are_drawn_by_the_next_call(tmp_path: Path) -> None:
-    write(tmp_path, **TWO_JOBS)
-    assert sweep(tmp_path) == 0
-    (picture,) = (tmp_path / "out").glob("small-gap_1-smoke/neat-*/plots/network.svg")
+def test_figures_that_are_missing_are_drawn_by_the_next_call(finished: Path) -> None:
+    (picture,) = (finished / "out").glob("small-gap_1-smoke/neat-*/plots/network.svg")
     before = picture.read_bytes()
     picture.unlink()
-    assert sweep(tmp_path) == 0
+    assert sweep(finished) == 0
     assert picture.read_bytes() == before
 
 
 def test_side_by_side_a_failure_is_named_with_its_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
-    write(tmp_path, **TWO_JOBS)
+    write(tmp_path, conditions={"clean": {"label": "clean"}})
     jobs = plan(tmp_path)
     spoilt = jobs[1].settings.directory.path
     spoilt.parent.mkdir(parents=True)
@@ -254,16 +240,15 @@ def test_an_experiment_that_makes_no_sense_is_refused_before_anything_runs(
     check_refusal(["sweep", f"experiment={path}", "budget=smoke", "output=out"], [named], tmp_path, capfd)
 
 
-def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(tmp_path: Path) -> None:
-    write(tmp_path, **TWO_JOBS)
-    assert sweep(tmp_path) == 0
-    job = plan(tmp_path)[0]
+def test_a_run_of_the_plan_that_is_still_going_is_not_counted_as_finished(finished: Path) -> None:
+    job = plan(finished)[0]
     assert job.is_finished()
     manifest = job.settings.directory.manifest
     manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "status": "running"}))
     assert not job.is_finished()
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_settings_may_be_left_out_and_a_report_names_the_experiment_that_there_are_runs_of(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,7 +24,9 @@ from exneat_cli.records.champion import read_champion
 from exneat_cli.runs import RunSettings, train
 from exneat_cli.tasks import TASKS, AntTask, Hunting
 from exneat_cli.wiring import LINKAGES, Geometry, Wiring
+from tests.records.histories import history_of
 
+pytestmark = pytest.mark.usefixtures("no_figures")
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CONF = ["--config-dir", str(EXAMPLES / "conf")]
 
@@ -74,11 +76,6 @@ def load(example: str) -> Any:
     sys.modules[name] = module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def history_of(run: Path) -> list[dict[str, str]]:
-    with (run / "history.csv").open(encoding="utf-8") as file:
-        return [{name: value for name, value in row.items() if name != "wall_seconds"} for row in csv.DictReader(file)]
 
 
 @pytest.mark.parametrize("name", CHAMPIONS)
@@ -131,7 +128,7 @@ def test_what_an_example_adds_trains_is_tested_and_resumes_to_the_same_history(
     assert (run / "robustness.csv").exists()
     assert main([*asked, "generations=5", "resume=true"]) == 0
     undisturbed = RunSettings.from_plain({**read_yaml(run / "config.yaml"), "output": "undisturbed"})
-    assert history_of(run) == history_of(train(undisturbed).directory.path)
+    assert history_of(run / "history.csv") == history_of(train(undisturbed).directory.history)
 
 
 def test_the_task_goes_by_its_class_and_as_the_package_that_its_pyproject_makes(
@@ -150,7 +147,7 @@ def test_the_task_goes_by_its_class_and_as_the_package_that_its_pyproject_makes(
     TASKS.pop("corridor", None)  # where importing the file put it, if nobody had imported it before
     assert main(["train", "task=custom", "task.name=corridor", "budget=smoke"]) == 0
     one, other = Path("outputs/corridor").iterdir()
-    assert history_of(one) == history_of(other)
+    assert history_of(one / "history.csv") == history_of(other / "history.csv")
 
 
 def test_the_lamp_of_the_corridor_is_found() -> None:
@@ -162,8 +159,10 @@ def test_the_experiment_of_ones_own_is_swept_and_reported() -> None:
     experiment = f"experiment={EXAMPLES / 'my_experiment.yaml'}"
     assert main(["sweep", experiment, "budget=smoke"]) == 0
     assert main(["report", experiment, "budget=smoke"]) == 0
-    assert Path("outputs/report/my_experiment/index.html").exists()
-    with Path("outputs/report/my_experiment/comparison-my_experiment.csv").open(encoding="utf-8") as file:
+    report = Path("outputs/report/my_experiment")
+    assert "Four modules with shared genomes" in (report / "index.html").read_text(encoding="utf-8")
+    assert {"training-noisy.svg", "robustness-noisy-sensor_noise.svg"} < {path.name for path in report.iterdir()}
+    with (report / "comparison-my_experiment.csv").open(encoding="utf-8") as file:
         assert [row["variant"] for row in csv.DictReader(file)] == ["NEAT", "ExNEAT, shared"]
 
 
