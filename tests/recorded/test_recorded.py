@@ -18,6 +18,7 @@ from exneat_cli.records import provenance
 from exneat_cli.records.champion import read_champion
 from exneat_cli.rollouts import Sweep
 from exneat_cli.runs import RunSettings, run_robustness, train
+from tests.records.histories import history_of
 
 HERE = Path(__file__).parent
 PROCESSOR = "AMD EPYC"
@@ -25,11 +26,6 @@ PROCESSOR = "AMD EPYC"
 STEPS = 12
 
 RUNS = sorted(path.parent.name for path in HERE.glob("*/settings.yaml"))
-
-
-def rows_without_time(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8") as file:
-        return [{name: value for name, value in row.items() if name != "wall_seconds"} for row in csv.DictReader(file)]
 
 
 def outputs_of(champion_file: Path) -> list[list[str]]:
@@ -53,9 +49,9 @@ def test_a_recorded_run_gives_the_same_bytes_again(tmp_path: Path, name: str) ->
     directory = train(settings).directory
     sweeps = [Sweep(**sweep) for sweep in recorded["sweeps"]]
     run_robustness(directory, sweeps, episodes=recorded["sweep_episodes"], executor=settings.executor)
-    history = rows_without_time(directory.history)
-    assert history == rows_without_time(HERE / name / "history.csv")
-    assert list(history[0]) == list(rows_without_time(HERE / name / "history.csv")[0])
+    history = history_of(directory.history)
+    assert history == history_of(HERE / name / "history.csv")
+    assert list(history[0]) == list(history_of(HERE / name / "history.csv")[0])
     assert directory.robustness.read_bytes() == (HERE / name / "robustness.csv").read_bytes()
     with (HERE / name / "outputs.csv").open(encoding="utf-8") as file:
         assert outputs_of(directory.champion) == list(csv.reader(file))
