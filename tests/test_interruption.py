@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from exneat_cli.errors import ExneatError
-from exneat_cli.interruption import SIGNALS, listening, scratch_directory, signal_heard, uninterrupted
+from exneat_cli.interruption import listening, scratch_directory, signal_heard, uninterrupted
 from exneat_cli.main import main
 
 PRELUDE = """
@@ -60,7 +60,7 @@ with listening():
     assert (done.stdout, done.stderr, done.returncode) == ("went on\n", "", 0)
 
 
-@pytest.mark.parametrize("number", [*SIGNALS, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_scratch_directories_are_gone_with_their_process_or_at_the_next_start(
     number: signal.Signals, tmp_path: Path
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Iterable
 from dataclasses import replace
@@ -53,7 +52,7 @@ def test_one_subpopulation_evolves_exactly_like_neat_population() -> None:
 
 
 @pytest.mark.parametrize("tied", [False, True], ids=["distinct", "heavily tied"])
-@pytest.mark.parametrize("subpopulations", [1, 2, 4])
+@pytest.mark.parametrize("subpopulations", [1, 3])
 @pytest.mark.parametrize("genome", ["array", "stock"])
 def test_the_best_team_meets_the_next_generation_intact(genome: str, subpopulations: int, tied: bool) -> None:
     settings = EvolutionSettings(genome=genome, compatibility_threshold=0.8, max_stagnation=4)
@@ -126,22 +125,6 @@ def test_initial_hidden_nodes_have_the_same_ids_also_after_an_extinction(genome:
             assert all(genome.nodes["key"].tolist() == [0, 1, 2] for team in teams for genome in team.genomes)
         tell(evolution, [1.0] * len(teams))
     assert extinctions >= 2
-
-
-def test_ask_and_tell_refuse_to_be_called_out_of_turn() -> None:
-    evolution = Coevolution(problem_of(EvolutionSettings(), 5))
-    with pytest.raises(RuntimeError, match="expected ask"):
-        tell(evolution, [0.0] * 5)
-    evolution.ask()
-    with pytest.raises(RuntimeError, match="expected tell"):
-        evolution.ask()
-    with pytest.raises(ValueError, match="expected 5 fitness values, got 4"):
-        tell(evolution, [0.0] * 4)
-    with pytest.raises(ValueError, match="got nan for team 2"):
-        tell(evolution, [0.0, 0.0, math.nan, 0.0, 0.0])
-    tell(evolution, [0.0] * 5)
-    with pytest.raises(RuntimeError, match="expected ask"):
-        tell(evolution, [0.0] * 5)
 
 
 def test_a_team_that_failed_is_no_candidate_and_loses_to_all_others() -> None:

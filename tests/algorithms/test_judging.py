@@ -131,16 +131,3 @@ def test_a_failure_in_the_second_look_drops_a_team() -> None:
     search.tell(Results(np.array([[-100.0], [8.0]]), np.array([True, False])))
     assert teams[9].ids not in {each.team.ids for each in search.candidates()}
     assert search.ask()[0][0].ids == teams[8].ids
-
-
-def test_a_search_goes_on_from_its_state_as_if_nothing_had_been() -> None:
-    problem = judged_problem(24, 2)
-    search, rng = Coevolution(problem), np.random.default_rng(5)
-    for _ in range(3):
-        generation(search, lambda _: float(rng.standard_normal()))
-    again = Coevolution(problem, search.state())
-    for each in (search, again):
-        value = iter(range(1000))
-        for _ in range(2):
-            generation(each, lambda _, value=value: float(next(value)))  # type: ignore[misc]
-    assert [team.ids for team in search.ask()[0]] == [team.ids for team in again.ask()[0]]

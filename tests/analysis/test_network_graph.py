@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, FancyArrowPatch
+from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch
 
-from exneat_cli.analysis import network_graph
 from exneat_cli.analysis.champion_graph import (
     MOST_EDGES,
     depths,
@@ -223,7 +222,11 @@ def test_a_missing_or_damaged_champion_is_refused_in_one_line(tmp_path: Path) ->
 
 
 def test_no_two_modules_of_a_body_have_one_colour() -> None:
-    assert len({network_graph._colour(m) for m in range(24)}) == 24
+    legs = [a_module(f"leg {k}", (0.0, float(k)), 0, pins=[reads(0)], outputs=1, drives=[k]) for k in range(24)]
+    joints = [f"hip {k}" for k in range(24)]
+    axes = axes_of(champion_of(a_champion(legs, [a_genome([0], [(-1, 0, 1.0)])], joints, 1)))
+    boxes = [patch for patch in axes.patches if isinstance(patch, FancyBboxPatch)]
+    assert len({box.get_edgecolor() for box in boxes}) == len(boxes) == 24
 
 
 def test_many_sensors_stand_by_quantity_and_of_many_connections_the_strongest_are_drawn() -> None:

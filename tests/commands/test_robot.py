@@ -11,6 +11,7 @@ from exneat_cli.records import read_robustness
 from exneat_cli.records.champion import read_champion
 from tests.commands.refusals import check_refusal
 
+pytestmark = pytest.mark.usefixtures("no_figures")
 LEG = """
       <body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" range="-40 40"/>
         <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -0.3"/></body>"""

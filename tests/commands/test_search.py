@@ -14,6 +14,7 @@ import pytest
 from exneat_cli.main import main
 from exneat_cli.records import find_runs
 
+pytestmark = pytest.mark.usefixtures("no_figures")
 ROOT = Path(__file__).parents[2]
 TINY = ["task=general_maze", "budget=smoke", "generations=1", "population=6", "seed=100", "executor=serial"]
 SPACE = """

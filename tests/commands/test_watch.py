@@ -30,6 +30,7 @@ from exneat_cli.main import main
 from exneat_cli.records import RunDirectory
 from exneat_cli.records.video import VIDEO_FORMATS
 from exneat_cli.runs import Scene, record_champion
+from tests.commands.figures import without_figures
 from tests.commands.refusals import check_refusal
 
 FFMPEG = "pip install 'exneat[video]'"
@@ -38,8 +39,7 @@ FFMPEG = "pip install 'exneat[video]'"
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("outputs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+    with without_figures():
         for settings in (
             ["task=foraging", "task.steps=9"],
             ["task=foraging", "task.steps=9", "seed=1"],

@@ -130,8 +130,10 @@ def started(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
     return process, children
 
 
-@pytest.mark.parametrize("send", [os.kill, os.killpg])
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("send", "number", "code"),
+    [(os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143), (os.killpg, signal.SIGTERM, 143)],
+)
 def test_a_signal_ends_all_processes_and_the_last_lines_say_how_to_go_on(
     tmp_path: Path, send: Callable[[int, int], None], number: int, code: int
 ) -> None:

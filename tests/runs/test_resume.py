@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from exneat_cli.algorithms import RECURRENT
-from exneat_cli.errors import ExneatError
 from exneat_cli.records import RunDirectory
 from exneat_cli.rollouts import Executor, Sweep
 from exneat_cli.runs import Progress, RunSettings, run_robustness, scores, train
@@ -203,12 +202,6 @@ def test_a_finished_run_that_is_made_longer_ends_as_one_that_was_longer_from_the
     assert not settings.directory.robustness.exists()
     run_robustness(settings.directory, [SWEEP], episodes=3, executor=Executor("serial"))
     assert content(settings.directory) == content(longer.directory)
-
-
-def test_a_run_is_never_made_shorter(tmp_path: Path) -> None:
-    train(small(tmp_path))
-    with pytest.raises(ExneatError, match=r"holds a run of 5 generations, and 3 are asked for"):
-        train(small(tmp_path, generations=3, resume=True))
 
 
 def test_going_on_with_other_versions_is_said_and_noted(tmp_path: Path) -> None:

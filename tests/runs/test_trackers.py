@@ -202,18 +202,3 @@ def test_a_tracker_that_is_not_installed_is_refused_before_anything_is_written(
     assert not (tmp_path / "out").exists()
     with pytest.raises(ConfigError, match="did you mean tensorboard"):
         small_run(str(tmp_path), "tensorbord")
-
-
-def test_nothing_of_any_tracker_is_loaded_by_a_plain_run_nor_by_help(tmp_path: Path) -> None:
-    train = ["train", "task=track_maze", "budget=smoke", "population=4", "generations=1", f"output={tmp_path}"]
-    code = f"""
-        import sys
-        import exneat_cli
-        from exneat_cli.main import main
-        for arguments in (["--help"], ["train", "--help"], {train!r}):
-            assert main(arguments) == 0
-        others = {{"tensorboard", "wandb", "mlflow", "optuna", "nbformat", "onnx", "imageio_ffmpeg"}}
-        assert not others & set(sys.modules), others & set(sys.modules)
-    """
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr

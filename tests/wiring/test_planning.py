@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import pytest
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 from exneat_cli.algorithms import ALGORITHMS, EvolutionSettings
 from exneat_cli.errors import ConfigError
 from exneat_cli.tasks import AntTask, Part, Task
-from exneat_cli.wiring import LINKAGES, Geometry, Pin, Plan, Wiring, peers_of, plan_body, plan_modules
+from exneat_cli.wiring import Geometry, Pin, Plan, Wiring, peers_of, plan_body, plan_modules
 
 AROUND = ["front_left", "back_left", "back_right", "front_right"]
 
@@ -69,25 +68,6 @@ def test_links_of_a_shared_genome_mean_the_same_at_every_leg_and_are_delayed() -
         assert all(pin.delayed for pin in links)
     assert len(patterns) == 1
     assert not any(pin.delayed for pin in central.pins)
-
-
-@pytest.mark.parametrize(("linkage", "central"), list(itertools.product(LINKAGES, [True, False])))
-def test_links_that_read_a_central_module_need_one(linkage: str, central: bool) -> None:
-    if linkage in ("feedback", "full") and not central:
-        with pytest.raises(ConfigError, match=r"linkage: .*\n.*wiring\.central=true"):
-            ant_plan(linkage=linkage, central=central)
-    else:
-        assert ant_plan(linkage=linkage, central=central).modules
-
-
-def test_hidden_links_need_hidden_nodes() -> None:
-    with pytest.raises(ConfigError, match=r"evolution\.module_hidden"):
-        ant_plan("single", "hidden", hidden=0)
-
-
-def test_an_output_width_without_a_central_module_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"wiring\.output_width"):
-        ant_plan(central=False, width=3)
 
 
 @pytest.mark.parametrize("pin", [Pin(105), Pin(-1), Pin(6, 0), Pin(12, 4), Pin(0, 9)])

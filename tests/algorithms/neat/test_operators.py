@@ -179,7 +179,7 @@ def test_the_distance_of_a_thousand_pairs_is_neat_pythons_and_symmetric(column: 
         assert (distance == 0.0) == (one is other)
 
 
-def test_a_distance_reckoned_by_hand(config: Any) -> None:
+def test_the_distance_is_that_of_a_case_worked_out_by_hand(config: Any) -> None:
     config.compatibility_disjoint_coefficient, config.compatibility_weight_coefficient = 1.5, 0.5
     one = genome_of(
         [(0, 1.0, 1.0, 0), (1, 0.0, 1.0, 0), (4, 0.0, 1.0, 0)],

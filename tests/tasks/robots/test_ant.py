@@ -116,26 +116,6 @@ def test_exploding_physics_fails_and_the_next_episode_is_sound() -> None:
     assert step(ant)[0] == RUNNING
 
 
-def test_parts_are_the_legs_by_position_with_the_joints_of_that_leg() -> None:
-    task = AntTask()
-    driven = {part.name: [task.actuator_names[a] for a in part.actuators] for part in task.parts}
-    assert list(driven.items()) == [
-        ("front_left", ["hip_1 (150 N m)", "ankle_1 (150 N m)"]),
-        ("front_right", ["hip_4 (150 N m)", "ankle_4 (150 N m)"]),
-        ("back_left", ["hip_2 (150 N m)", "ankle_2 (150 N m)"]),
-        ("back_right", ["hip_3 (150 N m)", "ankle_3 (150 N m)"]),
-    ]
-    assert [[np.sign(x), np.sign(y)] for x, y in (part.position for part in task.parts)] == [
-        [1, 1],
-        [1, -1],
-        [-1, 1],
-        [-1, -1],
-    ]
-    assert [len(place.sensors) for place in (*task.parts, task.trunk)] == [22, 22, 22, 22, 17]
-    model_order = AntTask(part_order="model")
-    assert [part.name for part in model_order.parts] == ["front_left", "back_left", "back_right", "front_right"]
-
-
 def test_a_leg_senses_its_own_joints_and_bodies_and_no_others(gymnasium_ant: Any) -> None:
     model = gymnasium_ant.unwrapped.model
     task = AntTask()
