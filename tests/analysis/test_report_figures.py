@@ -44,6 +44,12 @@ PANELS = {
 }
 
 
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """All runs finished, with all levels; no test changes their files."""
+    return a_study(tmp_path_factory.mktemp("study"))
+
+
 def a_plan(kind: str) -> FigurePlan:
     return FigurePlan(f"figure-4.3-{kind}.5", kind, f"Made up, {kind}", PANELS[kind])
 
@@ -67,9 +73,11 @@ def test_equal_data_in_two_places_gives_equal_bytes_and_nothing_is_cut_off(tmp_p
 
 
 @pytest.mark.parametrize("kind", ["training", "training_runs", "area", "network"])
-def test_a_variant_without_a_finished_run_is_named_with_the_command_that_makes_it(tmp_path: Path, kind: str) -> None:
+def test_a_variant_without_a_finished_run_is_named_with_the_command_that_makes_it(
+    study: Study, tmp_path: Path, kind: str
+) -> None:
     with pytest.raises(MissingRunsError, match=r"no finished run of ExNEAT\n  exneat sweep experiment=track"):
-        caption(a_plan(kind), without(a_study(tmp_path), "exneat"), tmp_path)
+        caption(a_plan(kind), without(study, "exneat"), tmp_path)
     assert not (tmp_path / "report").exists()
 
 
@@ -82,24 +90,24 @@ def test_runs_that_were_never_swept_are_missing_even_where_baselines_were(tmp_pa
         caption(a_plan(kind), study, tmp_path)
 
 
-def test_training_can_be_drawn_over_each_measure_of_effort(tmp_path: Path) -> None:
+def test_training_can_be_drawn_over_each_measure_of_effort(study: Study, tmp_path: Path) -> None:
     labels = {"generation": "generation", "episodes": "training episodes", "env_steps": "environment steps (control"}
     for axis, label in labels.items():
-        said = caption(a_plan("training"), a_study(tmp_path / axis), tmp_path, axis)
+        said = caption(a_plan("training"), study, tmp_path, axis)
         assert ("latest value" in said) == (axis != "generation")
         drawn = texts_of(tmp_path / "report" / "figure-4.3-training.5.svg")
         assert any(text.startswith(label) for text in drawn)
     with pytest.raises(ExneatError, match="axis: expected one of generation, episodes, env_steps, got 'hours'"):
-        caption(a_plan("training"), a_study(tmp_path), tmp_path, "hours")
+        caption(a_plan("training"), study, tmp_path, "hours")
 
 
-def test_the_caption_says_how_many_runs_of_what_budget_there_are(tmp_path: Path) -> None:
-    said = caption(a_plan("robustness"), a_study(tmp_path), tmp_path)
+def test_the_caption_says_how_many_runs_of_what_budget_there_are(study: Study, tmp_path: Path) -> None:
+    said = caption(a_plan("robustness"), study, tmp_path)
     assert said.startswith("Made up, robustness. Panel 1, no noise, number of runs: NEAT 3; ExNEAT 3; random actions 1")
     assert "Panel 2, much noise" in said
     assert "Intervals are too narrow below 10 runs" in said
     assert "Budget: quick. All variants had equal budgets of 400 training episodes per run" in said
-    assert "too narrow" not in caption(a_plan("area"), a_study(tmp_path / "area"), tmp_path), "it has no intervals"
+    assert "too narrow" not in caption(a_plan("area"), study, tmp_path), "it has no intervals"
 
 
 def test_the_champion_shown_is_that_of_the_run_best_on_validation(tmp_path: Path) -> None:
@@ -123,11 +131,11 @@ def test_the_champion_shown_is_that_of_the_run_best_on_validation(tmp_path: Path
     ],
 )
 def test_a_panel_that_names_what_is_not_there_is_refused_with_what_is(
-    tmp_path: Path, kind: str, change: dict[str, str], message: str
+    study: Study, tmp_path: Path, kind: str, change: dict[str, str], message: str
 ) -> None:
     plan = a_plan(kind)
     with pytest.raises(ExneatError, match=message):
-        caption(changed(plan, panels=(changed(plan.panels[0], **change),)), a_study(tmp_path), tmp_path)
+        caption(changed(plan, panels=(changed(plan.panels[0], **change),)), study, tmp_path)
 
 
 def test_an_experiment_of_baselines_alone_has_nothing_to_show(tmp_path: Path) -> None:
@@ -157,8 +165,7 @@ def test_a_variant_that_the_experiment_does_not_sweep_is_left_out(tmp_path: Path
         assert drawn(study, kind)[1] == {"exneat": 3, "random": 1}
 
 
-def test_means_and_bands_are_those_of_the_runs(tmp_path: Path) -> None:
-    study = a_study(tmp_path)
+def test_means_and_bands_are_those_of_the_runs(study: Study) -> None:
     axes, _ = drawn(study, "training")
     history = study.history("calm")
     best = history[history["variant"] == "exneat"].pivot(index="generation", columns="seed", values="best_so_far")
@@ -219,8 +226,7 @@ def marks_of_training(study: Study, kind: str) -> list[float]:
     return [float(x) for line in lines for x in set(line.get_xdata())]
 
 
-def test_the_level_of_training_is_marked(tmp_path: Path) -> None:
-    study = a_study(tmp_path)
+def test_the_level_of_training_is_marked(study: Study) -> None:
     # In clusters levels stand at whole numbers, whatever is between them.
     for kind, marks in {"robustness": {0.1: [0.1], 9.0: [9.0]}, "cluster": {0.1: [1.0], 0.05: [0.5], 9.0: []}}.items():
         assert marks_of_training(study, kind) == []
@@ -229,8 +235,8 @@ def test_the_level_of_training_is_marked(tmp_path: Path) -> None:
             assert marks_of_training(replace(study, trained=trained), kind) == expected
 
 
-def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(tmp_path: Path) -> None:
-    study = a_study(tmp_path, has_full_reward=True)
+def test_a_panel_can_ask_for_full_reward_and_leave_out_high_levels(study: Study) -> None:
+    study = replace(study, has_full_reward=True, fitness_name="forward reward")
     panels = [changed(SWEPT, value=value, highest=0.3) for value in ("fitness", "full_reward")]
     fitness, full = (drawn(study, "robustness", panel)[0] for panel in panels)
     assert list(fitness.get_lines()[0].get_xdata()) == [0.0, 0.1, 0.2, 0.3]
@@ -249,16 +255,15 @@ def test_in_a_cluster_every_run_has_a_point_at_every_level_and_variants_do_not_m
     assert [tick.get_text() for tick in axes.get_xticklabels()] == [f"{level:g}" for level in LEVELS]
 
 
-def test_the_area_of_a_run_is_the_mean_of_its_best_so_far(tmp_path: Path) -> None:
-    axes, counts = drawn(a_study(tmp_path), "area")
+def test_the_area_of_a_run_is_the_mean_of_its_best_so_far(study: Study) -> None:
+    axes, counts = drawn(study, "area")
     assert counts == {"neat": 3, "exneat": 3}
     np.testing.assert_allclose(
         np.asarray(axes.collections[0].get_offsets())[:, 1], 0.75 * np.array([0.3, 0.313, 0.326])
     )
 
 
-def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_path: Path) -> None:
-    study = a_study(tmp_path)
+def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(study: Study) -> None:
     found = set()
     for kind in FIGURE_KINDS[:-1]:
         for each in (study, replace(study, variants={"exneat": "ExNEAT", "random": "random actions"})):
@@ -271,9 +276,9 @@ def test_a_variant_has_one_colour_in_all_panels_whoever_stands_beside_it(tmp_pat
 
 
 @pytest.mark.parametrize("kind", ["training", "robustness", "cluster", "area"])
-def test_labels_of_users_are_shown_as_they_are(tmp_path: Path, kind: str) -> None:
+def test_labels_of_users_are_shown_as_they_are(study: Study, tmp_path: Path, kind: str) -> None:
     labels = {"neat": "_NEAT", "exneat": r"$\foo$ $$ 5%", "random": "__$"}
-    draw_figure(a_plan(kind), {"track": a_study(tmp_path, variants=labels)}, tmp_path / "report")
+    draw_figure(a_plan(kind), {"track": replace(study, variants=labels)}, tmp_path / "report")
     drawn = texts_of(tmp_path / "report" / f"figure-4.3-{kind}.5.svg")
     for variant, label in labels.items():
         assert (label in drawn) == (variant != "random" or kind in ("robustness", "cluster"))
@@ -293,12 +298,12 @@ def test_a_figure_for_paper_is_as_wide_as_its_columns_has_no_title_and_nothing_i
         assert float(size[1]) == pytest.approx(72 * width)
 
 
-def test_what_a_style_sheet_says_counts_more(tmp_path: Path) -> None:
+def test_what_a_style_sheet_says_counts_more(study: Study, tmp_path: Path) -> None:
     sheet = tmp_path / "mine.mplstyle"
     cycle = "axes.prop_cycle: cycler('color', ['123456', '234567'])"
     sheet.write_text(f"font.size: 13  # large\naxes.titlesize: medium\n\n# a comment\naxes.grid: False\n{cycle}\n")
     paper = Paper(2, read_style_sheet(sheet))
-    drawing = draw_figure(a_plan("training"), {"track": a_study(tmp_path)}, tmp_path / "report", paper=paper).paths[1]
+    drawing = draw_figure(a_plan("training"), {"track": study}, tmp_path / "report", paper=paper).paths[1]
     assert "font-size: 13px" in drawing.read_text()
     assert "stroke: #123456" in drawing.read_text()
     assert "stroke: #234567" in drawing.read_text()
@@ -327,6 +332,6 @@ def test_values_of_curves_are_shown_where_they_are_on_the_picture(tmp_path: Path
         )
 
 
-def test_curves_have_no_values_where_a_style_sheet_cuts_the_margins_off(tmp_path: Path) -> None:
+def test_curves_have_no_values_where_a_style_sheet_cuts_the_margins_off(study: Study, tmp_path: Path) -> None:
     paper = Paper(sheet={"savefig.bbox": "tight"})
-    assert not draw_figure(a_plan("training"), {"track": a_study(tmp_path)}, tmp_path / "report", paper=paper).strips
+    assert not draw_figure(a_plan("training"), {"track": study}, tmp_path / "report", paper=paper).strips

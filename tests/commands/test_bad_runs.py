@@ -11,6 +11,7 @@ import pytest
 
 from exneat_cli.main import main
 from exneat_cli.records import RunDirectory
+from tests.commands.figures import without_figures
 from tests.commands.refusals import check_refusal
 
 TRAIN = ["train", "task=track_maze", "budget=smoke", "generations=1", "population=4", "algorithm=neat"]
@@ -19,8 +20,7 @@ TRAIN = ["train", "task=track_maze", "budget=smoke", "generations=1", "populatio
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("sound")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+    with without_figures():
         assert main([*TRAIN, f"output={output}"]) == 0
     (run,) = (output / "track_maze").iterdir()
     return run
@@ -58,7 +58,7 @@ MANIFESTS = {
     "result": (manifest_with(result=[1]), "manifest.json: damaged: result: expected a section"),
     "figures": (manifest_with(result={"champion": {}}), "manifest.json: damaged: result.champion: "),
 }
-"""How a manifest is spoilt, and what evaluate and inspect must name."""
+"""How a manifest is spoilt, and what must be named."""
 
 CHAMPIONS = {
     "field": (champion_with("wurst", value=1), "champion.json: damaged: object contains unknown field wurst"),
@@ -67,7 +67,7 @@ CHAMPIONS = {
     "actuators": (champion_with("actuators", value=[]), "champion.json: damaged"),
     "scores": (champion_with("scores", value={}), "champion.json: damaged"),
 }
-"""How a champion is spoilt, and what evaluate and inspect must name."""
+"""How a champion is spoilt, and what must be named."""
 
 OTHERS = {
     "old": (manifest_with(format=2), "manifest.json: expected format 4, got 2"),
@@ -109,7 +109,7 @@ def test_evaluate_refuses_a_spoilt_run(
     check_refusal(["evaluate", f"run={run}", "sweep=gap", "sweep.levels=[1]"], [named], tmp_path, capfd)
 
 
-@pytest.mark.parametrize("name", [*MANIFESTS, *CHAMPIONS])
+@pytest.mark.parametrize("name", ["status", "pin"])
 def test_inspect_refuses_a_spoilt_run_and_lists_it_as_damaged_if_its_manifest_is(
     name: str, sound: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

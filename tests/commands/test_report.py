@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import yaml
 
 from exneat_cli.analysis.catalogue import read_catalogue
 from exneat_cli.commands.shipped import shipped_directory, shipped_files
 from exneat_cli.commands.sweep import Experiment, read_experiment
 from exneat_cli.main import main
+from tests.analysis.fake_studies import contents
+from tests.commands.figures import without_figures
 
 CATALOGUE = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
 IDS = [
@@ -32,8 +33,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         for module in ("sweep", "report"):
             patch.setattr(f"exneat_cli.commands.{module}.read_experiment", shortened)
-        with pytest.MonkeyPatch.context() as meanwhile:  # the figures of single runs are not looked at here, and slow
-            meanwhile.setattr("exneat_cli.commands.jobs.Job.draw", lambda *arguments, **options: None)
+        with without_figures():
             for name in shipped_files("experiments"):
                 assert main(["sweep", f"experiment={name}", "budget=smoke", f"output={output}"]) == 0
         yield output
@@ -48,10 +48,6 @@ def shortened(name: object) -> Experiment:
 
 def report(output: Path, *arguments: str) -> int:
     return main(["report", f"output={output}", *arguments])
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_the_catalogue_has_every_figure_and_table_of_the_thesis_and_ours() -> None:
@@ -113,27 +109,6 @@ def test_what_is_missing_is_named_with_the_command_that_makes_it_and_the_rest_is
     message = capsys.readouterr().err
     assert "no finished run of NEAT" in message
     assert len(message.strip().splitlines()) <= 3
-
-
-def test_an_experiment_of_the_users_own_gets_figures_and_a_comparison(tmp_path: Path) -> None:
-    own = {
-        "claim": "It works with mine.",
-        "settings": {"task": "hunting"},
-        "variants": {
-            "one": {"label": "one", "settings": {"algorithm": "neat"}},
-            "four": {"label": "four", "settings": {"geometry": "all"}},
-        },
-        "conditions": {"calm": {"label": "calm", "settings": {"task.p_m": 0.1}, "sweeps": ["p_m"]}},
-        "runs": {"smoke": 2},
-    }
-    path = tmp_path / "mine.yaml"
-    path.write_text(yaml.safe_dump(own))
-    output = tmp_path / "outputs"
-    assert main(["sweep", f"experiment={path}", "budget=smoke", f"output={output}"]) == 0
-    assert report(output, f"experiment={path}", "budget=smoke") == 0
-    made = set(contents(output / "report" / "mine"))
-    assert {"training-calm.svg", "robustness-calm-p_m.svg", "comparison-mine.csv", "index.html"} <= made
-    assert "It works with mine." in (output / "report" / "mine" / "index.html").read_text()
 
 
 def test_every_condition_and_variant_of_the_catalogue_is_one_of_its_experiment() -> None:

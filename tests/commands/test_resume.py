@@ -11,6 +11,7 @@ from exneat_cli.main import main
 from exneat_cli.records import RunDirectory, find_runs, read_robustness
 from exneat_cli.runs import Progress
 
+pytestmark = pytest.mark.usefixtures("no_figures")
 SETTINGS = ("budget=smoke", "task=general_maze", "task.size=7", "evolution.conn_add_prob=0.4", "generations=3")
 SWEEP = ("sweep=sensor_noise", "sweep.levels=[0,0.1]")
 
@@ -45,28 +46,3 @@ def test_a_run_that_is_not_there_and_a_task_that_is_not_named_are_refused(
     assert "no run is there" in capsys.readouterr().err
     assert main(["resume"]) == 2
     assert "run: expected a run directory" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(("typed", "meant"), [("trian", "train"), ("inspct", "inspect"), ("reprot", "report")])
-def test_a_misspelt_command_gets_the_nearest_one(typed: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([typed]) == 2
-    assert f"did you mean {meant}?" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("typed", "meant"),
-    [
-        ("train populaton=3", "population"),
-        ("train tsk=ant", "task"),
-        ("train algorithm=exnet", "exneat"),
-        ("train pairing=rnk", "rank"),
-        ("sweep experimnt=ant", "experiment"),
-        ("report only=figure-4.33", "figure-4.3"),
-        ("evaluate run=x sweep=sensor_nose", "sensor_noise"),
-    ],
-)
-def test_a_misspelt_key_or_option_gets_the_nearest_one(
-    typed: str, meant: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(typed.split()) == 2
-    assert f"did you mean {meant}?" in capsys.readouterr().err

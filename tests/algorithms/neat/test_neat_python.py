@@ -115,7 +115,7 @@ def test_threads_that_draw_from_pythons_generator_change_nothing(genome: str) ->
 
 
 @pytest.mark.parametrize(("column", "shape"), [("recurrent", (2, 0, 1)), ("feed-forward", (4, 4, 2))])
-@pytest.mark.parametrize("population", [8, 10, 13, 20, 31, 50, 64, 90, 100, 200])
+@pytest.mark.parametrize("population", [8, 13, 31, 100])
 def test_no_run_aborts_in_fifty_generations(column: str, shape: tuple[int, int, int], population: int) -> None:
     evolution = Coevolution(problem_of(COLUMNS[column], population, 2, shape=shape, seed=population))
     rng = np.random.default_rng(population)
