@@ -1,6 +1,6 @@
-"""What an agent senses and drives, and what counts as good. Knows nothing of networks.
+"""Tasks: what an agent senses and drives, and how it is scored. Nothing here knows about networks.
 
-Importing this room registers the grid worlds with Gymnasium, e.g. ``exneat/TrackMaze-v0``.
+Importing this package registers the grid worlds with Gymnasium, e.g. ``exneat/TrackMaze-v0``.
 """
 
 import gymnasium

@@ -1,4 +1,4 @@
-"""What only some tasks offer; the other rooms ask with `isinstance`."""
+"""Optional capabilities of tasks, which the other rooms check with `isinstance`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class HasTiles(Protocol):
     """A task whose world can be drawn as tiles."""
 
     def tiles(self, world: Any) -> NDArray[np.float64]:
-        """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
+        """(N, N, 3) current path (1 or 0) and both channels of every tile."""
 
 
 @runtime_checkable
@@ -23,7 +23,7 @@ class HasInitialPose(Protocol):
     """A task whose worlds start from a pose that `noise.reset_scale` disturbs."""
 
     def usual_reset_scale(self) -> float:
-        """The size of this noise unless told otherwise."""
+        """The default size of this noise."""
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
         """Open a new world, with noise of this size on the initial pose."""
@@ -31,26 +31,26 @@ class HasInitialPose(Protocol):
 
 @runtime_checkable
 class HasFullReward(Protocol):
-    """A task with a second figure besides the fitness."""
+    """A task with a second score besides the fitness."""
 
     def full_reward_of(self, totals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(...) the second figure that tests report."""
+        """(...) full reward of episodes whose terms add up to `totals`, (..., terms)."""
 
 
 @runtime_checkable
 class HasDistance(Protocol):
-    """A task whose fitness says how far an episode led."""
+    """A task whose fitness can be converted to a distance."""
 
     def metres_of(self, fitness: float) -> float:
-        """Distance travelled forward (m)."""
+        """Forward distance (m) of an episode with this fitness."""
 
 
 @runtime_checkable
 class HasAdapter(Protocol):
-    """A task whose champions can be taken to other programs although it turns readings or actions."""
+    """A task that transforms readings or actions and whose champions can still run in other programs."""
 
     def adapter(self) -> Adapter:
-        """How readings become what brains sense, and what brains put out becomes controls."""
+        """How readings become sensed values, and a brain's outputs controls."""
 
 
 @runtime_checkable
@@ -58,19 +58,19 @@ class HasPicture(Protocol):
     """A task whose world can be filmed."""
 
     def snapshot(self, world: Any) -> Any:
-        """What a picture of the world as it is now needs, as data that other processes can read."""
+        """The data for a picture of the world's current state, in a form that other processes can read."""
 
     def camera(self, width: int, height: int) -> Camera:
-        """Something that makes pictures of snapshots, of so many pixels."""
+        """A camera that draws snapshots in this size (pixels)."""
 
 
 @runtime_checkable
 class HasBatch(Protocol):
-    """A task of which many worlds run side by side on a GPU."""
+    """A task that can run many worlds in parallel on a GPU."""
 
     def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
         """Open `count` worlds on a device, with `room` times the usual room for contacts.
 
         Raises:
-            ConfigError: they cannot run there.
+            ConfigError: the task cannot run there.
         """

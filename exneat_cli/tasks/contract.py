@@ -1,6 +1,6 @@
-"""The contract of a task, tried before anything runs: what it says of itself, and what its worlds do.
+"""Check that a task keeps its contract, in its description and in its worlds, before anything runs.
 
-Compiled code writes where it is told to, so a size that is wrong would go unnoticed, or end the process.
+Compiled code does not check bounds, so a wrong size would go unnoticed or crash the process.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from exneat_cli.tasks.capabilities import HasFullReward, HasInitialPose
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Part, Simulation, Task
 
 TRIAL_SECONDS = 2.0
-"""An episode that is tried is given up after this long; those of simulators can take minutes."""
+"""A trial episode is abandoned after this time (s), since a simulator's episode can take minutes."""
 GUARD = 64
-"""Entries behind each array, which nothing may write to."""
+"""Number of guard entries behind each array, which nothing may write to."""
 RESET_SCALE = 0.1
-"""Noise on the initial pose, as runs have it unless told otherwise."""
+"""Noise on the initial pose, the default of runs."""
 LONGEST_NAME = 200
-"""Characters of the name of a sensor, an actuator, a part or a reward term."""
+"""Maximum length of the name of a sensor, an actuator, a part or a reward term."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _tried: set[tuple[type[Task], str]] = set()
 
 
 def is_ours(task: Task) -> bool:
-    """Whether a task is one of exneat's own, which the tests hold to the contract."""
+    """Whether a task is one of exneat's own, whose contract is checked by the test suite."""
     return type(task).__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def check_description(task: Task) -> None:
-    """Refuse names, sizes and indices that make no sense; opens no world.
+    """Refuse invalid names, sizes and indices, without opening a world.
 
     Raises:
-        ConfigError: one of them does not, named as ``<class>.<member>``.
+        ConfigError: one of them is invalid; the key is ``<class>.<member>``.
     """
     kind = type(task).__name__
     with _explained(kind, "a task whose members can be read"):
@@ -149,11 +149,11 @@ def _check_array(key: str, came: Any, shape: tuple[int, ...]) -> None:
 
 
 def check_worlds(task: Task) -> None:
-    """Try a user's task once in this process: open its worlds, and run an episode in each. Ours pass untried.
+    """Open the worlds of a user's task and run an episode in each, once per process; our own tasks are not tried.
 
     Raises:
         ConfigError: a function cannot be called as `Simulation` says, does not write what it should, writes beyond its
-            array, or draws chance from elsewhere than its generator.
+            array, or draws random numbers from elsewhere than its generator.
     """
     key = type(task), json.dumps(dataclasses.asdict(task), sort_keys=True)  # type: ignore[call-overload]
     if is_ours(task) or key in _tried:
@@ -169,7 +169,7 @@ def check_worlds(task: Task) -> None:
 
 
 class _Trial:
-    """One world of a task, and arrays for what its functions write."""
+    """One world of a task, whose functions are called with guarded arrays."""
 
     def __init__(self, task: Task, simulation: Any) -> None:
         self.task, self.simulation, self.kind = task, simulation, type(task).__name__
@@ -190,7 +190,7 @@ class _Trial:
             raise ConfigError(f"{self.kind}.open: {name}", "a compiled function", function, fix)
 
     def run(self) -> None:
-        """Start a world three times, which must be the same, and run an episode of random actions."""
+        """Run an episode of random actions, and check that `rewind` and `reset` restart the same world."""
         task, rng = self.task, np.random.default_rng(0)
         first = self._started("reset", np.random.default_rng(1))
         self._episode(rng)
@@ -207,7 +207,7 @@ class _Trial:
         return self._written("observe", self.task.observation_size)
 
     def _episode(self, rng: np.random.Generator) -> None:
-        """Act at random until the end, which must come in time, or until `TRIAL_SECONDS` are over."""
+        """Act at random until the episode ends, within `longest_episode` steps, or `TRIAL_SECONDS` are over."""
         task, status, steps, began = self.task, RUNNING, 0, time.monotonic()
         low, high = task.action_bounds
         while status == RUNNING and time.monotonic() - began < TRIAL_SECONDS:
@@ -248,7 +248,7 @@ class _Trial:
         return values[:size]
 
     def _check_written(self, name: str, values: NDArray[np.float64], size: int) -> None:
-        """Refuse entries that were left as they were or are not finite, and writing behind the array's end."""
+        """Refuse entries that are unwritten or not finite, and writes behind the array's end."""
         wrong = np.flatnonzero(~np.isfinite(values[:size]))
         if wrong.size:
             came = f"{values[wrong[0]]} in entry {wrong[0]}"
@@ -260,7 +260,7 @@ class _Trial:
         signature = {"reset": "world, rng", "rewind": "world", "drive": "world, action", "locate": "world, row"}
         signature |= {"observe": "world, readings", "sense": "world, readings, sensed", "step": "world, action, terms"}
         function: Callable[..., Any] = getattr(self.simulation, name)
-        # Compiled code that reads a generator must not be interrupted; what hangs must.
+        # Compiled code that reads a generator must not be interrupted; any other function must be, since it may hang.
         guarded = uninterrupted() if name == "reset" else contextlib.nullcontext()
         with _explained(f"{self.kind}: {name}", f"a function that runs as {name}({signature[name]})"), guarded:
             return function(self.simulation.world, *arguments)
@@ -268,7 +268,7 @@ class _Trial:
 
 @contextlib.contextmanager
 def _explained(key: str, expected: str) -> Iterator[None]:
-    """Whatever a user's code raises, but for our own errors, as a `ConfigError`."""
+    """Turn any exception of a user's code, except our own errors, into a `ConfigError`."""
     try:
         yield
     except ExneatError:

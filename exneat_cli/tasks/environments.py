@@ -1,4 +1,4 @@
-"""Gymnasium environments: how one is made, what goes into it and comes out of it, and what it looks like."""
+"""Gymnasium environments: making them, their spaces, and their pictures."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from exneat_cli.tasks.user_code import make_findable
 
 
 class Interface(NamedTuple):
-    """What goes into an environment and comes out of it.
+    """The spaces and metadata of an environment.
 
-    low, high: (A,) what -1 and 1 stand for; `space`: of the environment's actions; `first`: the smallest of several
-    actions, None if they are numbers; `max_steps`: its own limit, if it has one; `render_modes`, `render_fps`: how it
-    can be drawn, and control steps a second, if they have a duration; `is_mujoco`: whether MuJoCo simulates it.
+    `low`, `high`: (A,) the actions that -1 and 1 stand for; `space`: the action space; `first`: the smallest discrete
+    action, None if actions are continuous; `max_steps`: the environment's own limit, if any; `render_modes`,
+    `render_fps`: how it can be drawn, and control steps per second, if they have a duration; `is_mujoco`: whether
+    MuJoCo simulates it.
     """
 
     observation_size: int
@@ -43,11 +44,11 @@ class Interface(NamedTuple):
 
     @property
     def is_discrete(self) -> bool:
-        """Whether one of several actions is chosen."""
+        """Whether actions are discrete."""
         return self.first is not None
 
     def taken(self, action: NDArray[np.float64]) -> Any:
-        """Our action, (A,), in the environment's own terms."""
+        """Convert our action, (A,), to the environment's action space."""
         if self.first is not None:
             return self.first + int(np.argmax(action))
         share = (np.clip(action, -1.0, 1.0) + 1.0) / 2.0
@@ -57,7 +58,7 @@ class Interface(NamedTuple):
 
 @functools.lru_cache(64)
 def interface_of(env_id: str, kwargs: str) -> Interface:
-    """Make the environment once to see its spaces; `kwargs` is JSON."""
+    """Make the environment once to read its spaces and metadata; `kwargs` is JSON."""
     env = make(env_id, json.loads(kwargs), None)
     try:
         senses, acts = env.observation_space, env.action_space
@@ -76,7 +77,7 @@ def interface_of(env_id: str, kwargs: str) -> Interface:
         raise _unsupported(env_id, "actions that are Discrete or a Box of real numbers", acts)
     low, high = acts.low.ravel().astype(float), acts.high.ravel().astype(float)
     has_low, has_high = np.isfinite(low), np.isfinite(high)
-    # Two units wide where a bound is missing: -1 to 1, or from the other bound on.
+    # Where a bound is missing, the range is two units wide: -1 to 1, or starting from the other bound.
     lowest = np.where(has_low, low, np.where(has_high, high - 2.0, -1.0))
     highest = np.where(has_high, high, np.where(has_low, low + 2.0, 1.0))
     return Interface(size, len(low), lowest, highest, acts, None, max_steps, *shown)
@@ -94,11 +95,11 @@ def _unsupported(env_id: str, expected: str, came: object) -> ConfigError:
 
 
 def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymnasium.Env[Any, Any]:
-    """Make an environment, or say in words why that cannot be."""
+    """Make an environment, or raise a `ConfigError` that says why it cannot be made."""
     module, _, own_id = env_id.rpartition(":")
     if module:
         _import(module, env_id)
-    # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
+    # Otherwise MuJoCo would write MUJOCO_LOG.TXT into the working directory; its warning counters are not affected.
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         with warnings.catch_warnings():
@@ -108,22 +109,22 @@ def make(env_id: str, kwargs: Mapping[str, Any], max_steps: int | None) -> gymna
         raise ConfigError("task.env_id", "an environment that is installed", env_id, in_words(error)) from error
     except gymnasium.error.Error as error:
         raise _unknown(env_id) from error
-    except Exception as error:  # whatever its constructor raises
+    except Exception as error:  # its constructor may raise anything
         if kwargs:
             expected = f"arguments that {env_id} takes"
             raise ConfigError("task.kwargs", expected, dict(kwargs), in_words(error)) from error
         raise ConfigError("task.env_id", "an environment that can be made", env_id, in_words(error)) from error
     if env.spec is None or env.spec.id != own_id:
-        raise _unknown(env_id)  # Gymnasium takes the newest version where none is named
+        raise _unknown(env_id)  # Gymnasium takes the newest version if none is given
     return env
 
 
 def _import(module: str, env_id: str) -> None:
-    """Import what registers an environment; whoever may not have that done is refused before, see `find_task`."""
+    """Import the module that registers an environment; `find_task` has checked before that this is allowed."""
     make_findable(module.partition(".")[0])
     try:
         importlib.import_module(module)
-    except (Exception, SystemExit) as error:  # whatever its code does
+    except (Exception, SystemExit) as error:  # its code may raise anything
         expected = "a module that can be imported from here, a colon and an id"
         raise ConfigError("task.env_id", expected, env_id, in_words(error)) from error
 
@@ -135,30 +136,30 @@ def _unknown(env_id: str) -> ConfigError:
 
 
 def in_words(error: BaseException) -> str:
-    """An error of any code in one line."""
+    """Any error as one line of text."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]
 
 
 PICTURES = "rgb_array"
-"""The render mode in which an environment hands out its pictures."""
+"""The render mode in which an environment returns pictures."""
 Snapshot = tuple[bytes, tuple[int, int, int]]
-"""An environment's own picture, compressed by zlib, since an episode has hundreds, and its shape."""
+"""An environment's own picture, compressed with zlib since an episode has hundreds of them, and its shape."""
 
 
 def picture_of(env: gymnasium.Env[Any, Any], env_id: str) -> Snapshot:
-    """What an environment made for `PICTURES` looks like now.
+    """The current picture of an environment that was made with the render mode `PICTURES`.
 
     Raises:
         ExneatError: it cannot be drawn here, or gives no picture.
     """
-    # pygame greets on standard output, and looks for a screen that nobody needs.
+    # pygame prints a greeting to standard output, and looks for a screen that is not needed.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pygame's, about libraries of its own
+            warnings.simplefilter("ignore")  # pygame's, about its dependencies
             picture: Any = env.render()
-    except Exception as error:  # of any code
+    except Exception as error:  # rendering may raise anything
         raise ExneatError(f"task.env_id={env_id}: it cannot be drawn here: {in_words(error)}") from error
     pixels = np.asarray(picture)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8:
@@ -168,9 +169,9 @@ def picture_of(env: gymnasium.Env[Any, Any], env_id: str) -> Snapshot:
 
 
 class EnvironmentCamera:
-    """Hands on the pictures that environments draw themselves, in their own size."""
+    """Returns the pictures that environments draw themselves, in their own size."""
 
     def draw(self, snapshot: Snapshot) -> NDArray[np.uint8]:
-        """(height, width, 3)."""
+        """(height, width, 3) the picture in a snapshot."""
         content, shape = snapshot
         return np.frombuffer(zlib.decompress(content), np.uint8).reshape(shape)

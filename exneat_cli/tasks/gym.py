@@ -1,11 +1,11 @@
-"""Any Gymnasium environment that gives a Box of numbers and takes a Box of numbers or one of several actions.
+"""Any Gymnasium environment with Box observations and Box or Discrete actions.
 
-It runs in plain Python, which is slower than the compiled tasks. Its observation, of whatever shape, is laid out flat
-in C order, and so is a Box of actions:
+It runs in plain Python, which is slower than the compiled tasks. Observations and Box actions of any shape are
+flattened in C order:
 
 | action space | entries of our action | meaning |
 |---|---|---|
-| Box | one per number | -1 is the lowest and 1 the highest value; without bounds -1 and 1 are the values themselves |
+| Box | one per number | -1 is the lowest and 1 the highest value; without bounds, -1 and 1 are the values themselves |
 | Discrete | one per action | the largest wins, after U(0, 1e-3) is added to each so that ties break fairly |
 
 Scoring: the fitness of an episode is its return, the sum of its rewards.
@@ -49,10 +49,10 @@ from exneat_cli.tasks.environments import (
 from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Adapter, Camera, Part, Simulation, Task, setting
 
 LARGEST = 2**25
-"""Readings, or entries of actions, in a longest episode, 256 MiB: noise needs room for all of them."""
+"""Most readings, or entries of actions, in one episode (256 MiB), since noise is kept for a whole episode."""
 _OURS = ("id", "max_episode_steps", "disable_env_checker")
 _ABOUT_THE_ACTION = (ArithmeticError, AssertionError, ValueError, gymnasium.error.InvalidAction, mujoco.FatalError)
-"""What environments raise over an action that they cannot take, or a state that it has led to."""
+"""Errors that environments raise for an action that they cannot take, or for the state that it leads to."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,17 @@ class GymTask(Task):
 
     Attributes:
         name: always ``gym``.
-        env_id: as `gymnasium.make` takes it; ``module:Env-v0`` imports the module first.
-        kwargs: plain data that the environment's constructor takes.
+        env_id: an id for `gymnasium.make`; ``module:Env-v0`` imports the module first.
+        kwargs: arguments of the environment's constructor, plain data.
         max_steps: control steps after which an episode ends, None for the environment's own limit.
-        failure_floor: fitness of an episode that failed; below any return that an ordinary one may have.
+        failure_floor: fitness of a failed episode; it should be below any ordinary return.
         part_entries: ``{name: {"sensors": [...], "actuators": [...]}}``, the setting ``task.parts``: entries of the
-            observation and of the action of each part, in the order of geometry vectors; None makes one part of all.
+            observation and of the action of each part, in the order of geometry vectors; None makes one part of
+            everything.
 
     Raises:
-        ConfigError: a value is out of range, or the environment does not exist, cannot be made or has other spaces.
+        ConfigError: a value is out of range, or the environment does not exist, cannot be made or has unsupported
+            spaces.
     """
 
     name: str = "gym"
@@ -100,7 +102,7 @@ class GymTask(Task):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Those of the setting, evenly around a circle for want of other places; or one of everything."""
+        """The parts in the setting, evenly spaced on a circle for lack of places; or one part of everything."""
         if self.part_entries is None:
             everything = tuple(range(self.observation_size)), tuple(range(len(self.actuator_names)))
             return (Part("body", *everything, position=(0.0, 0.0)),)
@@ -118,7 +120,7 @@ class GymTask(Task):
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
-        """``action_0``, ``action_1``, ...: numbers of a Box, or actions to choose from."""
+        """``action_0``, ``action_1``, ...: one per number of a Box, or per discrete action."""
         return tuple(f"action_{k}" for k in range(self._interface.actions))
 
     @property
@@ -128,18 +130,18 @@ class GymTask(Task):
 
     @property
     def tie_noise(self) -> float:  # type: ignore[override]
-        """As in the grid worlds where one of several actions is chosen, else 0."""
+        """As in the grid worlds if actions are discrete, else 0."""
         return 1e-3 if self._interface.is_discrete else 0.0
 
     @property
     def action_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """-1 and 1 for a Box; 0 and 1, so that random values choose all actions equally often."""
+        """-1 and 1 for a Box; 0 and 1 for discrete actions, so that random values choose all of them equally often."""
         ones = np.ones(self._interface.actions)
         return (np.zeros_like(ones) if self._interface.is_discrete else -ones), ones
 
     @property
     def resting_action(self) -> NDArray[np.float64]:
-        """Values as near to 0 as a Box allows; the first of several actions, whatever it does."""
+        """The values nearest to 0 that a Box allows; the first discrete action, whatever it means."""
         interface = self._interface
         if interface.is_discrete:
             return np.asarray(np.eye(interface.actions)[0])
@@ -148,12 +150,12 @@ class GymTask(Task):
         return np.asarray(2.0 * (np.clip(0.0, low, high) - low) / span - 1.0)
 
     def open(self, *, training: bool) -> Simulation:
-        """Make the environment; `training` changes nothing."""
+        """Make the environment; `training` has no effect."""
         world = _World(make(self.env_id, self.kwargs, self.max_steps), self._interface, self.env_id)
         return Simulation(world, _reset, _rewind, _observe, _step, compiled=False)
 
     def adapter(self) -> Adapter:
-        """The bounds of a Box; several actions to choose from stay as they are."""
+        """Scales actions to the bounds of a Box; discrete actions are left unscaled."""
         interface, ones = self._interface, np.ones(self._interface.actions)
         if interface.is_discrete:
             return Adapter(self.sensor_names, None, ones, 0.0 * ones, ones, bounded=False)
@@ -162,20 +164,20 @@ class GymTask(Task):
 
     @property
     def step_seconds(self) -> float | None:
-        """By the frames a second that the environment is made to be watched at, one a control step (s)."""
+        """Duration of a control step (s), from the environment's ``render_fps`` with one frame per step."""
         fps = self._interface.render_fps
         return 1.0 / fps if fps else None
 
     @property
     def drawn_by_mujoco(self) -> bool:  # type: ignore[override]
-        """Whether it is one of the environments on MuJoCo."""
+        """Whether MuJoCo simulates the environment."""
         return self._interface.is_mujoco
 
     def drawable(self) -> GymTask:
-        """The same environment, made to hand out pictures.
+        """The same environment, made so that it returns pictures.
 
         Raises:
-            ExneatError: it has none.
+            ExneatError: it cannot return any.
         """
         if PICTURES not in (modes := self._interface.render_modes):
             came = f"expected an environment with the render mode {PICTURES}, got {', '.join(modes) or 'none'}"
@@ -183,11 +185,11 @@ class GymTask(Task):
         return replace(self, kwargs={**self.kwargs, "render_mode": PICTURES})
 
     def snapshot(self, world: _World) -> Snapshot:
-        """What the environment draws."""
+        """The picture that the environment draws."""
         return picture_of(world.env, self.env_id)
 
     def camera(self, width: int, height: int) -> Camera:
-        """Pictures of the environment's own size, whatever is asked for."""
+        """Draws pictures in the environment's own size; `width` and `height` have no effect."""
         return EnvironmentCamera()
 
     @property
@@ -196,7 +198,7 @@ class GymTask(Task):
 
 
 def _checked_kwargs(kwargs: object) -> dict[str, Any]:
-    """The arguments in alphabetical order: the same ones are the same run."""
+    """The arguments in alphabetical order, so that their order does not change a run's hash."""
     section = check_section("task.kwargs", kwargs)
     try:
         json.dumps(section, allow_nan=False)
@@ -211,7 +213,7 @@ def _checked_kwargs(kwargs: object) -> dict[str, Any]:
 
 
 def _check_parts(parts: object, sensors: int, actuators: int) -> None:
-    """Refuse parts without sensors or actuators, that overlap, or that name entries which are not there."""
+    """Refuse parts that lack sensors or actuators, overlap, or name entries that do not exist."""
     taken: dict[tuple[str, int], str] = {}
     if not check_section("task.parts", parts):
         raise ConfigError("task.parts", "at least one part, or null", parts)
@@ -241,7 +243,7 @@ class _World:
         self.warnings = 0
 
     def see(self, observation: Any) -> None:
-        """Take in what the environment shows."""
+        """Store an observation of the environment."""
         seen = np.asarray(observation, dtype=np.float64).ravel()
         if seen.shape != self.observation.shape:
             sizes = f"expected observations of {self.observation.size} numbers, got {seen.size}"
@@ -249,14 +251,14 @@ class _World:
         self.observation = seen
 
     def new_warnings(self) -> bool:
-        """Whether MuJoCo has given some since the last call: it resets a body that explodes, and goes on paying."""
+        """Whether MuJoCo has warned since the last call: it resets an unstable simulation, and rewards would go on."""
         if self.data is None:
             return False
         before, self.warnings = self.warnings, int(self.data.warning.number.sum())
         return self.warnings != before
 
     def fault(self, function: str, error: Exception) -> ExneatError:
-        """That the environment itself is broken."""
+        """The error for an exception in the environment's own code."""
         return ExneatError(f"task.env_id={self.env_id}: its {function}() raised {in_words(error)}")
 
 

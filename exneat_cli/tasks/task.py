@@ -1,4 +1,4 @@
-"""What every task offers to the other rooms."""
+"""The interface of every task."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from numpy.typing import NDArray
 RUNNING = 0
 """The episode goes on."""
 ENDED = 1
-"""The episode is over in an ordinary way: solved, fallen, stuck or out of time."""
+"""The episode has ended normally: solved, fallen, stuck or out of time."""
 FAILED = 2
-"""The simulation exploded or a value was not finite; nothing that it gave counts."""
+"""The simulation became unstable or a value was not finite; the episode's rewards do not count."""
 
 
 def setting(name: str, default: Any) -> Any:
-    """A dataclass field whose setting is called `name`, where the field itself cannot be: ``parts`` is a property."""
+    """A dataclass field for the setting `name`, where that name is taken: ``parts``, for example, is a property."""
     return field(default=default, metadata={"setting": name})
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the body with its own sensors, and maybe its own actuators.
+    """A part of the body with its own sensors and possibly actuators.
 
     Attributes:
         name: unique within the task, e.g. ``front_left``.
-        sensors: entries of what brains sense that this part senses.
+        sensors: entries of the sensed values that belong to this part.
         actuators: entries of the action that move this part.
         position: (x, y) of the part seen from the trunk, x ahead and y to the left, in the task's length unit.
         height: of the part above the trunk's origin, in the same unit.
-        likeness: number of the class of parts that are built alike; -1 where nobody compared them.
-        is_mirrored: whether it is a mirrored one of the first part of its class.
-        joints: those of its sensors that are positions and velocities of its joints.
+        likeness: number of its class of parts that are built alike; -1 if parts were not compared.
+        is_mirrored: whether it is a mirror image of the first part of its class.
+        joints: those of its sensors that read the positions and velocities of its joints.
         mirrored_joints: the entries that mirrored parts read instead.
-        trunk: entries of the trunk as seen from this part.
+        trunk: entries of the trunk's values as seen from this part.
     """
 
     name: str
@@ -62,19 +62,19 @@ class Simulation:
 
     Attributes:
         world: the storage, first argument of all functions.
-        reset: ``reset(world, rng)`` draws all the chance of a new world from a NumPy Generator, and starts it.
+        reset: ``reset(world, rng)`` draws everything random in a new world from a NumPy Generator, and starts it.
         rewind: ``rewind(world)`` takes the same world back to its start.
         observe: ``observe(world, readings)`` writes the noiseless readings, (`Task.observation_size`,).
         step: ``step(world, action, terms)`` acts once, writes this step's reward terms and returns
             `RUNNING`, `ENDED` or `FAILED`.
-        locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`; None where it
-            has no place.
-        sense: ``sense(world, readings, sensed)`` turns noisy readings into what brains sense,
-            (`Task.sensed_size`,); None where that is the same.
-        drive: ``drive(world, action)`` turns what brains put out into what `step` takes, in place; None where
-            that is the same.
+        locate: ``locate(world, row)`` writes where the agent is, in the order of `Task.trace_columns`; None if it has
+            no location.
+        sense: ``sense(world, readings, sensed)`` turns noisy readings into sensed values, (`Task.sensed_size`,); None
+            if they are the same.
+        drive: ``drive(world, action)`` turns a brain's outputs into the action that `step` takes, in place; None if
+            they are the same.
         compiled: whether the functions are compiled.
-        owner: keeps alive what `world` only points to.
+        owner: keeps memory alive that `world` only points to.
     """
 
     world: Any
@@ -90,14 +90,14 @@ class Simulation:
 
 
 class Adapter(NamedTuple):
-    """What stands between a simulator and a brain, as data, so that a champion can run elsewhere.
+    """The conversions between a simulator and a brain, as data, so that a champion can run elsewhere.
 
     Attributes:
         readings: names of the simulator's readings, with units.
-        frames: `exneat_cli.tasks.robots.frames.Frames`, how readings become what is sensed; None where they are that.
-        signs: (A,) of the brain's outputs.
+        frames: `exneat_cli.tasks.robots.frames.Frames`, how readings become sensed values; None if they are the same.
+        signs: (A,) factors of the brain's outputs, 1 or -1.
         middle, span: (A,) the controls are middle + span * action.
-        bounded: whether the action is cut to [-1, 1] before.
+        bounded: whether the action is first clipped to [-1, 1].
     """
 
     readings: tuple[str, ...]
@@ -109,35 +109,35 @@ class Adapter(NamedTuple):
 
 
 class Camera(Protocol):
-    """Draws what a world was; belongs to one process."""
+    """Draws snapshots of worlds; belongs to one process."""
 
     def draw(self, snapshot: Any) -> NDArray[np.uint8]:
         """(height, width, 3) the picture of a `HasPicture.snapshot`; one of another size is made to fit."""
 
 
 class Task(ABC):
-    """A task's parameters, a frozen dataclass with range checks, and what follows from them."""
+    """A task's parameters, as a frozen dataclass with range checks, and the properties that follow from them."""
 
     terms: ClassVar[tuple[str, ...]]
     """Names of the reward terms that `Simulation.step` writes."""
     fitness_name: ClassVar[str] = "fitness"
-    """What the fitness is, in words, for sentences and axes."""
+    """Name of the fitness in sentences and on axes."""
     fitness_decimals: ClassVar[int] = 3
-    """Digits after the point that mean something to a reader."""
+    """Number of meaningful decimal places."""
     failure_floor: ClassVar[float] = 0.0
-    """Fitness of an episode that failed."""
+    """Fitness of a failed episode."""
     observation_limits: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
-    """What noisy readings are clipped to."""
+    """Limits to which noisy readings are clipped."""
     tie_noise: ClassVar[float] = 0.0
-    """U(0, tie_noise) is added to each entry of the action, where the largest one wins."""
+    """U(0, tie_noise) is added to each entry of the action, to break ties where the largest one wins."""
     recurrent: ClassVar[bool] = False
-    """Whether networks are recurrent unless told otherwise."""
+    """Whether networks are recurrent by default."""
     trace_columns: ClassVar[tuple[str, ...]] = ()
-    """Names of what `Simulation.locate` writes."""
+    """Names of the values that `Simulation.locate` writes."""
     trunk: ClassVar[Part | None] = None
-    """What belongs to no part, for a central module."""
+    """Everything that belongs to no part, for a central module."""
     drawn_by_mujoco: ClassVar[bool] = False
-    """Whether pictures need MuJoCo's renderer, and so EGL, OSMesa or a screen."""
+    """Whether pictures need MuJoCo's renderer, and therefore EGL, OSMesa or a screen."""
 
     name: str
     """The task's name in `conf/task` and in run directories."""
@@ -150,7 +150,7 @@ class Task(ABC):
     @property
     @abstractmethod
     def observation_size(self) -> int:
-        """Length of what the sensors read."""
+        """Number of sensor readings."""
 
     @property
     @abstractmethod
@@ -160,47 +160,47 @@ class Task(ABC):
     @property
     @abstractmethod
     def longest_episode(self) -> int:
-        """Control steps that no episode exceeds."""
+        """Maximum number of control steps per episode."""
 
     @abstractmethod
     def open(self, *, training: bool) -> Simulation:
-        """Open a new world; `training` switches on what belongs to training only, such as early stopping."""
+        """Open a new world; `training` switches on features of training, such as early stopping."""
 
     @property
     def sensed_size(self) -> int:
-        """Length of what brains sense: the readings, unless the world has a `sense` of its own."""
+        """Number of values that brains sense: that of the readings, unless the simulation has a `sense` function."""
         return self.observation_size
 
     def identity(self) -> dict[str, Any]:
-        """The parameters that make two tasks the same, as plain data for a run's hash."""
-        plain = self.to_plain()  # the order of parts counts, since geometry vectors go by it
+        """The parameters by which two tasks are the same, as plain data for a run's hash."""
+        plain = self.to_plain()  # the order of parts matters, since geometry vectors follow it
         return {key: list(value.items()) if isinstance(value, dict) else value for key, value in plain.items()}
 
     def files(self) -> dict[str, bytes]:
-        """Contents of the files that the task is made of, which a run keeps, by their relative paths."""
+        """Contents of the task's own files, which a run stores, by relative path."""
         return {}
 
     @classmethod
     def found_in(cls, section: Mapping[str, Any], directory: Path) -> dict[str, Any]:
-        """Parameters as a run recorded them, reading `files` where it keeps them."""
+        """Parameters as recorded by a run, which stores the task's `files` in `directory`."""
         return dict(section)
 
     def shared_by(self, subpopulations: Sequence[int]) -> Task:
-        """The task once it is known which subpopulation each part belongs to, (parts,)."""
+        """The task once the subpopulation of each part's module is known, (parts,)."""
         return self
 
     @property
     def sensor_names(self) -> tuple[str, ...]:
-        """What is sensed, entry by entry, with its unit if it has one."""
+        """Names of the sensed values, with their units, if any."""
         return tuple(f"sensor {entry}" for entry in range(self.sensed_size))
 
     def remarks_on(self, part: Part) -> dict[str, str]:
-        """What else there is to say of a part, by a word."""
+        """Further remarks on a part, by keyword."""
         return {}
 
     @property
     def whole(self) -> tuple[int, ...]:
-        """Entries of what is sensed for a single network that senses everything, each thing once."""
+        """Entries of the sensed values for a single network that senses everything, without duplicates."""
         return tuple(range(self.sensed_size))
 
     @property
@@ -215,20 +215,20 @@ class Task(ABC):
         return np.zeros(len(self.actuator_names))
 
     def to_plain(self) -> dict[str, Any]:
-        """The parameters as plain data, by the names of their settings, see `setting`."""
+        """The parameters as plain data, by the names of their settings; see `setting`."""
         values = asdict(self)  # type: ignore[call-overload]
         return {each.metadata.get("setting", each.name): values[each.name] for each in fields(self)}  # type: ignore[arg-type]
 
     @property
     def step_seconds(self) -> float | None:
-        """What a control step takes (s); None where steps have no duration."""
+        """Duration of a control step (s); None if steps have no duration."""
         return None
 
     def drawable(self) -> Task:
-        """The task in the form whose worlds can be drawn, see `HasPicture`; itself unless that is another one.
+        """The task in a form whose worlds can be drawn, see `HasPicture`; by default the task itself.
 
         Raises:
-            ExneatError: they cannot.
+            ExneatError: its worlds cannot be drawn.
         """
         return self
 

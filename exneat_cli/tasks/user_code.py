@@ -1,8 +1,8 @@
-"""Code of users: where the classes of their tasks come from, and which settings would import code.
+"""Users' code: where the classes of their tasks come from, and which settings would import code.
 
-A class has its name in `TASKS` or among the entry points of an installed package, or the user names it by
-``task.kind=package.module:Class``. A setting that would import code is followed only if the user of this process named
-it himself (`NAMED`), never because a run directory, a champion or a checkpoint says so.
+A class is found by its name in `TASKS` or among the entry points of installed packages, or by
+``task.kind=package.module:Class``. A setting that would import code is followed only if the user of this process gave
+it explicitly (`NAMED`), never because a run directory, a champion or a checkpoint contains it.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from exneat_cli.tasks.task import Task
 ENTRY_POINTS = "exneat.tasks"
 """The group of entry points by which an installed package registers its tasks, name -> ``package.module:Class``."""
 NAMED: set[str] = set()
-"""The code that the user of this process named himself, as `code_in` gives it; launchers tell it to their workers."""
+"""Code that the user of this process named explicitly, as returned by `code_in`; launchers pass it to their workers."""
 _CODE = re.compile(r"[\w.]+:[\w./-]+")
 
 
 def code_in(section: Mapping[str, Any]) -> dict[str, str]:
-    """What a task's settings would import, by dotted key: its class, and the module before the id of an environment."""
+    """Code that a task's settings would import, by dotted key: its class, and the module before an environment's id."""
     named = {"task.kind": section.get("kind"), "task.env_id": section.get("env_id")}
     return {key: text for key, text in named.items() if isinstance(text, str) and (key == "task.kind" or ":" in text)}
 
 
 def find_task(section: Mapping[str, Any], registry: Mapping[str, type[Task]]) -> type[Task]:
-    """The class of a task with these settings: by its ``kind`` if they have one, else by its ``name``.
+    """The class of a task with these settings: by ``kind`` if they have one, else by ``name``.
 
     Raises:
-        ConfigError: there is no such class, it cannot be imported or is no task, or it would have to be imported
+        ConfigError: there is no such class, it cannot be imported or is not a task, or it would have to be imported
             although the user did not name it.
     """
     for key, reference in code_in(section).items():
@@ -78,14 +78,14 @@ def _by_name(name: object, registry: Mapping[str, type[Task]]) -> type[Task]:
 
 
 def _is_there(key: str, reference: str, registry: Mapping[str, type[Task]]) -> bool:
-    """Whether the class is registered, or the environment's module imported."""
+    """Whether the class is registered, or the environment's module already imported."""
     if key == "task.kind":
         return _registered(reference, registry) is not None
     return reference.partition(":")[0] in sys.modules
 
 
 def _registered(reference: str, registry: Mapping[str, type[Task]]) -> type[Task] | None:
-    """The class of this place, if it is in the registry or an installed package registers it."""
+    """The class with this reference, if it is in the registry or an installed package registers it."""
     for known in registry.values():
         if f"{known.__module__}:{known.__qualname__}" == reference:
             return known
@@ -97,7 +97,7 @@ def _imported(reference: str) -> type[Task]:
     make_findable(module.partition(".")[0])
     try:
         found: Any = functools.reduce(getattr, name.split("."), importlib.import_module(module))
-    except (Exception, SystemExit) as error:  # whatever its code does
+    except (Exception, SystemExit) as error:  # its code may raise anything
         why = f"{type(error).__name__}: {next(iter(str(error).splitlines()), '')}"
         raise ConfigError("task.kind", "a class that can be imported from here", reference, why[:300]) from error
     _check_class(found, reference)
@@ -105,19 +105,19 @@ def _imported(reference: str) -> type[Task]:
 
 
 def make_findable(package: str) -> None:
-    """Look in the current directory too, but for nothing that is found elsewhere, and only if it has this package.
+    """Append the current directory to the import path if a package is found there and nowhere else.
 
-    It comes last and stays on the path: what the package imports later, and workers, look for it there.
+    It stays on the path for workers and for later imports of the package.
     """
     importlib.invalidate_caches()
-    with contextlib.suppress(ValueError):  # modules such as __main__ do not say where they are from
+    with contextlib.suppress(ValueError):  # modules such as __main__ have no spec
         here = str(Path.cwd())
         if importlib.util.find_spec(package) is None and PathFinder.find_spec(package, [here]) is not None:
             sys.path.append(here)
 
 
 def _check_class(found: Any, reference: str) -> None:
-    """Refuse what is no frozen dataclass that derives from `Task` and defines all that a task must."""
+    """Refuse anything but a frozen dataclass that derives from `Task` and defines its abstract members."""
     if not isinstance(found, type) or not issubclass(found, Task):
         raise ConfigError("task.kind", "a class that derives from exneat_cli.tasks.Task", reference, f"it is {found!r}")
     if missing := sorted(found.__abstractmethods__) if inspect.isabstract(found) else []:

@@ -1,4 +1,4 @@
-"""Every grid world as a Gymnasium environment: the same compiled functions, one step at a time."""
+"""Grid worlds as Gymnasium environments: the same compiled functions, one step at a time."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ PIXELS_PER_TILE = 16
 class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
     """One grid world.
 
-    Observation, (8,) in [0, 1], and the five actions: `exneat_cli.tasks.grid.world`. Rewards add up to the
-    episode's fitness, all of it at the last step; `info` carries the terms. The step budget belongs to the
-    world, so episodes terminate and are never truncated.
+    For the observation, (8,) in [0, 1], and the five actions see `exneat_cli.tasks.grid.world`. Rewards add up to the
+    episode's fitness, which is paid at the last step; `info` has the terms. The step budget belongs to the world, so
+    episodes terminate and are never truncated.
 
     Args:
         task: a grid world's name in `exneat_cli.tasks.TASKS`.
         render_mode: ``rgb_array`` or ``ansi``.
-        parameters: of the world's dataclass, e.g. ``size=17``.
+        parameters: fields of the world's dataclass, e.g. ``size=17``.
 
     Raises:
         ConfigError: a parameter is out of range.
@@ -62,7 +62,7 @@ class GridEnvironment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
         Raises:
             ValueError: there is no such action.
-            ResetNeeded: no world was drawn yet.
+            ResetNeeded: `reset` has not been called yet.
         """
         if not self._is_reset:
             raise gymnasium.error.ResetNeeded("step: expected a call of reset before the first step, got none")

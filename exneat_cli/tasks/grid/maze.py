@@ -1,11 +1,11 @@
-"""What happens in both mazes: the way to the goal, scoring, and the compiled episode after its reset.
+"""What both mazes share: the way to the goal, scoring, and the compiled episode after its reset.
 
 A maze is solved when the agent stands on the goal. The episode ends there, or `t_fast + SPARE_STEPS` steps
 after its start, `t_fast` being the walking distance from start to goal. Its fitness, paid at the last
 step, is ``0.5 * time + 0.5 * progress``:
 
 * time = 1 - (t - t_fast) / SPARE_STEPS if solved at step t, else 0
-* progress = 1 - d(end) / d_max, d the walking distance to the goal, d_max its largest value in the maze
+* progress = 1 - d(end) / d_max, where d is the walking distance to the goal and d_max its maximum in the maze
 
 Standing still on a track scores 0.25. The formula printed in the thesis (Zhang, 2025, section 3.2.1) has
 the sign of the time term reversed: taken literally, a failure would score over 0.7.
@@ -25,11 +25,12 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 SPARE_STEPS = 2
 """Steps allowed beyond the fastest way (Zhang, 2025, section 3.2.1)."""
 GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST, START_ROW, START_COLUMN = range(6)
-"""Entries of `Maze.goal`: where it is, walking distance from the start, largest distance in the maze, the start."""
+"""Entries of `Maze.goal`: its place, its walking distance from the start, the largest distance in the maze, the
+start."""
 
 
 class Maze(NamedTuple):
-    """A maze of N x N tiles, and what its kind is made from."""
+    """A maze of N x N tiles, and the parameters from which it is drawn."""
 
     path: NDArray[np.int64]  #: (N, N), see `exneat_cli.tasks.grid.world.GridTask`
     signals: NDArray[np.float64]  #: (2, N, N), see there
@@ -39,7 +40,7 @@ class Maze(NamedTuple):
     time_share: float  #: weight of time in the fitness; progress has the rest
     cue_noise: float  #: sd of the noise on the cues of path tiles
     gap: int  #: silent tiles before the goal of a track
-    second_leads: bool  #: the second channel leads along every track, else one that is drawn
+    second_leads: bool  #: the second channel leads on every track; otherwise it is drawn
     weights: tuple[float, float]  #: of the cues on both channels of a general maze
     cues_removed: float  #: share of the path tiles of a general maze
     walls_removed: float  #: share of the walls between its cells
@@ -47,7 +48,7 @@ class Maze(NamedTuple):
 
 @compiled
 def begin(maze: Maze, start: tuple[int, int], goal: tuple[int, int]) -> None:
-    """Set start and goal, (row, column) of path tiles, measure all ways, and put the agent to the start."""
+    """Set start and goal, (row, column) of path tiles, measure all distances, and put the agent on the start."""
     maze.goal[START_ROW], maze.goal[START_COLUMN] = start
     maze.goal[GOAL_ROW], maze.goal[GOAL_COLUMN] = goal
     maze.goal[FURTHEST] = measure_distances(maze.path, goal, maze.distances)
@@ -57,7 +58,7 @@ def begin(maze: Maze, start: tuple[int, int], goal: tuple[int, int]) -> None:
 
 @compiled
 def measure_distances(path: NDArray[np.int64], goal: tuple[int, int], distances: NDArray[np.int64]) -> int:
-    """Write the walking distance of every tile of `path` to `goal` into `distances`, both (N, N); -1 without a way.
+    """Write the walking distance of every tile of `path` to `goal` into `distances`, both (N, N); -1 if unreachable.
 
     Returns:
         The largest distance.
@@ -101,7 +102,7 @@ def step(maze: Maze, action: NDArray[np.float64], terms: NDArray[np.float64]) ->
     late = agent[STEPS] - goal[FASTEST]
     if distance > 0 and late < SPARE_STEPS:
         return RUNNING
-    # Time counts for those who arrive, progress for everybody.
+    # Time is rewarded only on arrival, progress always.
     if distance == 0:
         terms[0] = maze.time_share * (1.0 - late / SPARE_STEPS)
     terms[1] = (1.0 - maze.time_share) * (1.0 - distance / goal[FURTHEST])

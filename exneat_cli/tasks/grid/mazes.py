@@ -1,16 +1,16 @@
-"""The mazes: a track and a general maze, which lead to their goal by two channels of cues.
+"""The mazes: a track and a general maze, with two channels of cues that lead to the goal.
 
 The track is one corridor. The agent starts in the middle; the goal is at the left or right end with equal chance. One
-channel, drawn per maze, leads: it rises from 0.1 beside the start to 0.5 at the goal, on the goal's side alone. The
-other misleads with the same ramp on both sides. In the thesis' text it is always the second that leads
+channel, drawn per maze, leads: it rises from 0.1 beside the start to 0.5 at the goal, on the goal's side only. The
+other one misleads: it has the same ramp on both sides. In the thesis' text, the second channel always leads
 (``leading=second``).
 
 The corridors of the general maze, drawn anew for each episode, are a spanning tree over the cells on odd rows and
-columns; start and goal are two of the maze's corners. On either channel the cue of a tile is
-``(d_max - d) / d_max`` times the channel's weight, d its walking distance to the goal and d_max the largest one: from 0
-at the furthest tile to the weight, 0.5, at the goal.
+columns; start and goal are two of the maze's corners. On each channel the cue of a tile is ``(d_max - d) / d_max``
+times the channel's weight, where d is its walking distance to the goal and d_max the largest one: from 0 at the
+furthest tile to the weight (0.5 by default) at the goal.
 
-Observation and action, index by index: `exneat_cli.tasks.grid.world`. Scoring: `exneat_cli.tasks.grid.maze`.
+For observations and actions see `exneat_cli.tasks.grid.world`, for scoring `exneat_cli.tasks.grid.maze`.
 Source: Zhang (2025), section 3.2.1.
 """
 
@@ -34,11 +34,11 @@ LEAST_CUE, MOST_CUE = 0.1, 0.5
 """Ends of the ramp, from the tile beside the start to the goal."""
 LEADING = ("random", "second")
 TIME_SHARES = {"time_and_progress": 0.5, "time": 1.0}
-"""What `task.fitness` may be -> weight of time in the fitness; progress has the rest."""
+"""Value of `task.fitness` -> weight of time in the fitness; progress has the rest."""
 
 
 class MazeTask(GridTask):
-    """A maze with the parameters of both kinds; the dataclasses that derive from it declare those that they have."""
+    """A maze with the parameters of both kinds; the dataclasses derived from it declare those that apply to them."""
 
     size: int
     cue_noise: float
@@ -56,7 +56,7 @@ class MazeTask(GridTask):
 
     @property
     def longest_episode(self) -> int:
-        """No way leads over more than all tiles."""
+        """An upper bound, as if the way led over all tiles."""
         return self.size**2 + SPARE_STEPS
 
     def targets(self, world: Any) -> list[tuple[int, int]]:
@@ -90,7 +90,7 @@ class MazeTask(GridTask):
             distances=np.zeros(tiles, np.int64),
             goal=np.zeros(6, np.int64),
             time_share=TIME_SHARES[self.fitness],
-            # A whole number would be another type to the compiler, and compiled apart.
+            # An integer would be another type, for which the functions would be compiled again.
             cue_noise=float(self.cue_noise),
             gap=self.gap,
             second_leads=self.leading == "second",
@@ -139,7 +139,7 @@ class GeneralMaze(MazeTask):
         cue_noise: sd of normal noise on the cues of path tiles; cues stay at least 0.
         cues_removed: share of path tiles without cues, 0 to 1.
         walls_removed: share of walls between cells that are opened, 0 to 1.
-        channel_weights: of the cues on both channels, each 0 to 1.
+        channel_weights: weights of the cues on the two channels, each 0 to 1.
         fitness: ``time_and_progress``, or ``time`` alone.
 
     Raises:
@@ -170,7 +170,7 @@ def draw_track(maze: Maze, rng: Generator) -> None:
     maze.path[middle, 1 : size - 1] = 1
     side = 1 if rng.random() < 0.5 else -1
     leading = 0 if rng.random() < 0.5 and not maze.second_leads else 1
-    # The k-th tile from the start: the leading channel speaks on the goal's side, the other one on both.
+    # The k-th tile from the start: the leading channel has cues on the goal's side only, the other one on both.
     maze.signals[:] = 0.0
     for k in range(1, reach + 1):
         cue = MOST_CUE if reach == 1 else LEAST_CUE + (MOST_CUE - LEAST_CUE) * (k - 1) / (reach - 1)
@@ -203,7 +203,7 @@ def draw_maze(maze: Maze, rng: Generator) -> None:
                 nearness = (furthest - maze.distances[row, column]) / furthest
                 for channel in range(CHANNELS):
                     maze.signals[channel, row, column] = nearness * maze.weights[channel]
-    # Tiles that lost their cue get noise as all others do.
+    # Tiles without cues get noise like all others.
     silent = draw_tiles(maze.path, int(np.rint(maze.cues_removed * maze.path.sum())), rng)
     for k in range(silent.shape[0]):
         maze.signals[:, silent[k, 0], silent[k, 1]] = 0.0
@@ -228,7 +228,7 @@ def carve(path: NDArray[np.int64], rng: Generator) -> None:
         next_row, next_column = row + 2 * ROW_STEPS[side], column + 2 * COLUMN_STEPS[side]
         if next_row < 0 or next_column < 0 or next_row >= path.shape[0] or next_column >= path.shape[0]:
             continue
-        # The way by which a cell is entered for the first time belongs to the tree.
+        # The step by which a cell is first entered belongs to the tree.
         if path[next_row, next_column] == 0:
             path[next_row, next_column] = 1
             path[(row + next_row) // 2, (column + next_column) // 2] = 1
@@ -239,7 +239,7 @@ def carve(path: NDArray[np.int64], rng: Generator) -> None:
 @compiled
 def remove_walls(maze: Maze, rng: Generator) -> None:
     """Open a share of the walls that stand between two cells."""
-    # A wall between two cells has one odd coordinate; where both are even stands a pillar.
+    # A wall between two cells has one odd coordinate; a tile whose coordinates are both even is a pillar.
     walls, size = np.zeros_like(maze.path), maze.path.shape[0]
     for row in range(1, size - 1):
         for column in range(1 + row % 2, size - 1, 2):
@@ -252,7 +252,7 @@ def remove_walls(maze: Maze, rng: Generator) -> None:
 @compiled
 def add_cue_noise(maze: Maze, rng: Generator) -> None:
     """Add noise to the cues of path tiles, in the order of rows, columns and channels; cues stay at least 0."""
-    if maze.cue_noise == 0.0:  # draws nothing then
+    if maze.cue_noise == 0.0:  # then no numbers are drawn
         return
     for row in range(maze.path.shape[0]):
         for column in range(maze.path.shape[0]):

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Snapshot = tuple[NDArray[np.float64], tuple[int, int], list[tuple[int, int]]]
-"""Tiles, (N, N, 3), as of `exneat_cli.tasks.HasTiles`; row and column of the agent, and of all targets."""
+"""Tiles, (N, N, 3), see `exneat_cli.tasks.HasTiles`; row and column of the agent, and of each target."""
 
 
 def coloured(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[tuple[int, int]]) -> NDArray[np.float64]:
     """(N, N, 3) one colour per tile, between 0 and 1."""
-    # Silent tiles are white; channel 1 takes away green and blue (red stays), channel 2 red and green. Where both are
-    # loud purple stays, which is no wall.
+    # Tiles without cues are white; channel 1 removes green and blue and leaves red, channel 2 removes red and green.
+    # Tiles with strong cues on both are purple, and so differ from walls.
     cues = np.clip(tiles[..., 1:], 0.0, 1.0)
     colours = np.stack([1.0 - 0.7 * cues[..., 1], 1.0 - cues.max(axis=2), 1.0 - 0.7 * cues[..., 0]], axis=2)
     colours[tiles[..., 0] == 0] = 0.0
@@ -23,19 +23,19 @@ def coloured(tiles: NDArray[np.float64], agent: tuple[int, int], targets: list[t
 
 
 def enlarged(colours: NDArray[np.float64], pixels: int) -> NDArray[np.uint8]:
-    """(N * pixels, N * pixels, 3) the same with so many pixels to a tile."""
+    """(N * pixels, N * pixels, 3) the colours, with `pixels` x `pixels` pixels per tile."""
     picture = np.kron(colours, np.ones((pixels, pixels, 1)))
     return np.asarray(255 * picture, np.uint8)
 
 
 class GridCamera:
-    """Draws snapshots, as large as whole pixels per tile allow, on grey."""
+    """Draws snapshots on grey, as large as a whole number of pixels per tile allows."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = height, width
 
     def draw(self, snapshot: Snapshot) -> NDArray[np.uint8]:
-        """(height, width, 3)."""
+        """(height, width, 3) the picture of a snapshot."""
         colours = coloured(*snapshot)
         height, width = self._size
         tiles = enlarged(colours, max(1, min(self._size) // len(colours)))[:height, :width]

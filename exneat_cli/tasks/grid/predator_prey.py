@@ -1,6 +1,6 @@
 """Predator and prey: foraging, where prey stand still, and hunting, where they move.
 
-The agent starts in the centre of an open square with a wall around. Prey emit odour (channel 1) and sound
+The agent starts in the centre of an open square surrounded by a wall. Prey emit odour (channel 1) and sound
 (channel 2) in Gaussian patches; in foraging each emits one of them, alternating by index, in hunting both.
 
 Each step begins with the world: a share `p_c` of the cue field persists; each free prey on the agent's tile is
@@ -9,15 +9,15 @@ the same patch with its values shuffled, which carries no direction. Then the ag
 onto a prey catches it. The episode ends when all are caught, or after `steps` moves. Its fitness, paid at the
 last step, is the share of prey caught.
 
-With ``rules=library`` prey are caught at the beginning of a step alone, before they move, so that one that walks onto
-the agent is not, nor one that the last move leads to; and prey may start on the agent's tile.
+With ``rules=library``, prey are caught only at the beginning of a step, before they move: not when they move onto the
+agent, nor when the agent's last move reaches them. Prey may start on the agent's tile.
 
-The reset has drawn all paths and cues (`exneat_cli.tasks.grid.prey_field`), so a step only looks up four tiles;
-a caught prey's cues are taken from the moment before, and fade.
+The reset draws all paths and cues in advance (`exneat_cli.tasks.grid.prey_field`), so a step only looks up four tiles.
+A caught prey's cues are those from just before it was caught, and fade.
 
-Observation and action, index by index: `exneat_cli.tasks.grid.world`.
+For observations and actions see `exneat_cli.tasks.grid.world`.
 Source: Zhang (2025), section 3.2.2, and the library behind it, Multimodal_mazes by M. Ghosh (``rules=library``, and p_c
-as what persists, where the thesis calls it a decay).
+as the share that persists; the thesis calls it a decay).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING, Simulation
 MOTIONS = ("levy", "brownian")
 RULES = ("own", "library")
 MOST_CUES = 2**25
-"""Numbers that one world may hold, 256 MiB."""
+"""Most numbers that one world may hold (256 MiB)."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Foraging(GridTask):
         name: always ``foraging``.
         size: open tiles per side, 3 to 99.
         n_prey: at most size * size - 1.
-        steps: moves of the agent, at least 1; what every prey emits is kept for all of them, 256 MiB at most.
+        steps: moves of the agent, at least 1; the cues of all steps are kept in memory, 256 MiB at most.
         p_e: chance per prey, step and channel that the cue has a direction, 0 to 1.
         p_c: persistence, the share of the cues that is left after a step, 0 (they vanish at once) to 1 (they stay).
         patch_width: tiles per side of an emission, odd, 1 to 15.
-        rules: ``own`` or ``library``, when prey are caught and where they start.
+        rules: ``own`` or ``library``: when prey are caught and where they start.
 
     Raises:
         ConfigError: a value is out of range.
@@ -70,10 +70,10 @@ class Foraging(GridTask):
 
     terms: ClassVar[tuple[str, ...]] = ("caught",)
     channels: ClassVar[int] = 1
-    """On which each prey emits."""
+    """Number of channels on which each prey emits."""
     p_m = 0.0
     motion = "brownian"
-    """Prey never move here; no settings, see `Hunting`."""
+    """Prey never move in foraging; in `Hunting` these are settings."""
     came_later: ClassVar[dict[str, Any]] = {"rules": "own"}
 
     def __post_init__(self) -> None:
@@ -129,7 +129,7 @@ class Foraging(GridTask):
         return Simulation(field, reset, rewind, observe, step, locate)
 
     def tiles(self, world: Field) -> NDArray[np.float64]:
-        """(N, N, 3) path (1 or 0) and both channels of the cue field as the agent sensed it last."""
+        """(N, N, 3) path (1 or 0) and both channels of the cue field as last sensed by the agent."""
         tiles = np.stack([world.path, *np.zeros((CHANNELS, *world.path.shape))], axis=2)
         for emitter in range(world.cues.shape[3]):
             k = emitter // self.channels
@@ -169,14 +169,14 @@ class Hunting(Foraging):
 
 @compiled
 def reset(field: Field, rng: Generator) -> None:
-    """Draw prey, their ways and their cues, and start."""
+    """Draw prey, their paths and their cues, and start."""
     draw_prey(field, rng)
     rewind(field)
 
 
 @compiled_lean
 def rewind(field: Field) -> None:
-    """Put the agent into the centre and set all prey free, where they were."""
+    """Put the agent in the centre and all prey, free, where they started."""
     agent, prey = field.agent, field.prey
     agent[ROW] = agent[COLUMN] = field.path.shape[0] // 2
     agent[STEPS] = 0
@@ -188,13 +188,13 @@ def rewind(field: Field) -> None:
 
 @compiled_lean
 def advance(field: Field) -> int:
-    """Bring prey and cues to what the agent senses next; returns how many prey are free then."""
+    """Advance prey and cues to what the agent senses next; returns the number of prey that are then free."""
     agent, prey, strength, last_free = field.agent, field.prey, field.strength, field.last_free
     t = agent[STEPS]
     free = 0
     for k in range(prey.shape[0]):
         if prey[k, FREE] == 1:
-            # A free prey goes where the reset had it go, and stays free unless it meets the agent: there, or, by the
+            # A free prey moves as the reset has drawn, and stays free unless the agent is where it now is, or, by the
             # library's rules, where it was before.
             before = prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]
             row, column = field.places[t, k, 0], field.places[t, k, 1]
@@ -204,7 +204,7 @@ def advance(field: Field) -> int:
                 last_free[k] = t
                 free += 1
                 continue
-            # Caught: it emits no more, so its cues of the step before fade; before the first step there are none.
+            # Caught: it no longer emits, so its cues of the step before fade; before the first step there are none.
             prey[k, FREE] = 0
             if t == 0:
                 last_free[k] = 0
@@ -215,7 +215,7 @@ def advance(field: Field) -> int:
 
 @compiled_lean
 def observe(field: Field, observation: NDArray[np.float64]) -> None:
-    """Write the cue field on the four neighbours: per channel the sum over emitters."""
+    """Write the cue field on the four neighbours: for each channel, the sum over emitters."""
     agent, cues = field.agent, field.cues
     last_free, strength = field.last_free, field.strength
     row, column = agent[ROW], agent[COLUMN]
@@ -231,18 +231,18 @@ def observe(field: Field, observation: NDArray[np.float64]) -> None:
 
 @compiled_lean
 def step(field: Field, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
-    """Move once, and let the world do what comes before the next move; `terms`, (1,), become the share caught."""
+    """Move once, and advance the world to the next move; `terms`, (1,), becomes the share caught, 0 before the end."""
     prey, agent = field.prey, field.agent
     terms[:] = 0.0
     if not move(field.path, agent, action):
         return FAILED
-    # Stepping onto a prey catches it, by the library's rules when the next step begins.
+    # Stepping onto a prey catches it; by the library's rules, only when the next step begins.
     free = 0
     for k in range(prey.shape[0]):
         if not field.library and prey[k, PREY_ROW] == agent[ROW] and prey[k, PREY_COLUMN] == agent[COLUMN]:
             prey[k, FREE] = 0
         free += prey[k, FREE]
-    # Prey may run into the agent, which ends the episode too if they were the last.
+    # Prey may move onto the agent, which also ends the episode if they were the last.
     if agent[STEPS] < field.cues.shape[0] and free > 0:
         free = advance(field)
         if free > 0:

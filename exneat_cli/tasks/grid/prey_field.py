@@ -1,8 +1,7 @@
-"""The open field: its storage, and all that chance does in it, drawn at the reset.
+"""The open field: its storage, and everything random in it, drawn at the reset.
 
-Prey take no notice of the agent. So a reset draws all paths and cues up to the last step, each emitter's apart
-(an emitter is a prey on one channel). What the agent makes of them, and the order of events:
-`exneat_cli.tasks.grid.predator_prey`.
+Prey do not react to the agent. A reset therefore draws all paths and cues up to the last step, separately for each
+emitter (a prey on one channel). For the agent's part and the order of events see `exneat_cli.tasks.grid.predator_prey`.
 
 Source: Zhang (2025), section 3.2.2.
 """
@@ -20,39 +19,40 @@ from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, draw_tiles
 
 LONGEST_FLIGHT = 7
 FLIGHT_CHANCE = np.cumsum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0) / np.sum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0)
-"""Cumulative probability of flights of 1 to LONGEST_FLIGHT tiles: a length's own is proportional to length ** -2."""
+"""Cumulative probability of flights of 1 to LONGEST_FLIGHT tiles; that of each length is proportional to length **
+-2."""
 PATCH_SD = 1.0
 """Width of the bell of an emission, in tiles."""
 DRAWS_PER_NUMBER = 4
-"""Choices of a shuffle that share one uniform number; each of up to 225 uses at most 8 of its 53 bits."""
+"""Choices of a shuffle that share one uniform number; each, among at most 225, uses at most 8 of its 53 bits."""
 PREY_ROW, PREY_COLUMN, FREE = range(3)
-"""Columns of `Field.prey`: where it is, or was when it was caught, and whether it is free."""
+"""Columns of `Field.prey`: where a prey is, or was caught, and whether it is free."""
 WALK_ROW, WALK_COLUMN, DIRECTION, FLIGHT = range(4)
-"""Columns of `walkers`, (n_prey, 4): where a prey is on its way, its direction, and the steps left of its flight."""
+"""Columns of `walkers`, (n_prey, 4): where a prey is, its direction, and the steps left of its flight."""
 
 
 class Field(NamedTuple):
     """An open field of N x N tiles, the wall included, with prey.
 
-    T is the number of times that the agent senses, E that of emitters: emitter e is prey ``e // channels``, and is
-    heard on channel ``e % 2``. So prey on one channel alternate, and prey on both have two emitters.
+    T is the number of times that the agent senses, E the number of emitters: emitter e is prey ``e // channels``, on
+    channel ``e % 2``. Prey with one channel thus alternate between the two, and prey with both have two emitters.
     """
 
     path: NDArray[np.int64]  #: (N, N), see `exneat_cli.tasks.grid.world.GridTask`
     agent: NDArray[np.int64]  #: (3,), see there
-    prey: NDArray[np.int64]  #: (n_prey, 3) as the agent left them, see `PREY_ROW`
+    prey: NDArray[np.int64]  #: (n_prey, 3) their current state, see `PREY_ROW`
     start: NDArray[np.int64]  #: (n_prey, 2) where they are before the first step
     places: NDArray[np.int64]  #: (T, n_prey, 2) where each one is when the agent senses, unless it was caught
     cues: NDArray[np.float64]  #: (T, N, N, E) what each emitter adds to each tile when the agent senses
-    last_free: NDArray[np.int64]  #: (n_prey,) the time of the cues by which a prey is sensed: now, if it is free
-    strength: NDArray[np.float64]  #: (n_prey,) what is left of these cues
+    last_free: NDArray[np.int64]  #: (n_prey,) time of the cues by which a prey is sensed: now, if it is free
+    strength: NDArray[np.float64]  #: (n_prey,) share of these cues that is left
     patch: NDArray[np.float64]  #: (width, width) cue that an emission adds, 1 at its centre
     channels: int  #: on which each prey emits, 1 or 2
     emission: float  #: chance per prey, step and channel that the patch has a direction
     keep: float  #: share of the field that is left after a step
     motion: float  #: chance that a prey moves in a step; 0 where prey never move
     levy: bool  #: straight flights, else a new direction for each move
-    library: bool  #: whether prey are caught before they move alone, and may start where the agent does
+    library: bool  #: whether prey are caught only before they move, and may start where the agent does
 
 
 def bell(width: int) -> NDArray[np.float64]:
@@ -83,9 +83,9 @@ def draw_moment(
 ) -> None:
     """Draw where each prey goes and what it emits before the agent senses for the t-th time.
 
-    `walkers` and `shuffled`, (width, width) with the values of the patch, go on from where the last moment left them.
+    `walkers`, and `shuffled`, (width, width) with the values of the patch, carry over from one moment to the next.
     """
-    # Arrays are taken out of the tuple once: passing the tuple on costs more than what the callees do.
+    # Arrays are taken out of the tuple once: passing the tuple on costs more than the callees' work.
     path, cues = field.path, field.cues
     # A share of the field persists: one flat loop, which the compiler turns into vector instructions.
     now = cues[t].reshape(cues[t].size)
@@ -143,9 +143,9 @@ def add_patch(tiles: NDArray[np.float64], emitter: int, row: int, column: int, p
 
 @compiled
 def shuffle(values: NDArray[np.float64], rng: Generator) -> None:
-    """Bring `values` into any order with equal chance, in place."""
-    # Shuffling what was shuffled before is as fair as starting from order. A uniform number has bits for
-    # several choices; DRAWS_PER_NUMBER of them leave at least 21 bits of fairness for the last.
+    """Shuffle `values` in place; all orders are equally likely."""
+    # Shuffling an already shuffled array is as fair as shuffling a sorted one. A uniform number has enough bits for
+    # several choices: DRAWS_PER_NUMBER of them leave at least 21 bits.
     left_in_number = 0
     number = 0.0
     for i in range(values.size - 1, 0, -1):

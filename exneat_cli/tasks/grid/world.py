@@ -13,7 +13,7 @@ Observation (8 numbers without a unit, clipped to [0, 1]):
 | 6, 7 | the same below |
 
 Action (5 numbers, the value of each move): 0 left, 1 right, 2 up, 3 down, 4 stay. The largest wins, after
-U(0, 1e-3) is added to each so that ties break fairly. A step into a wall stays.
+U(0, 1e-3) is added to each so that ties break fairly. A step into a wall leaves the agent in place.
 
 A new world is a file with a frozen dataclass that derives from `GridTask` (the track of `exneat_cli.tasks.grid.mazes`
 is the shortest to start from), a line in `exneat_cli.tasks.TASKS`, and a YAML file in `conf/task`.
@@ -67,10 +67,10 @@ class GridTask(Task):
     )
     """Each senses two channels and gives the value of moving there."""
     came_later: ClassVar[dict[str, Any]] = {}
-    """Parameters that came later, with the value that gives what was before: with it they are no part of hashes."""
+    """Parameters added later, with the value that keeps the earlier behaviour; at that value they are not hashed."""
 
     def identity(self) -> dict[str, Any]:
-        """The parameters, but for those of `came_later` that change nothing."""
+        """The parameters, except those in `came_later` that change nothing."""
         plain = super().identity()
         return {name: value for name, value in plain.items() if (name, value) not in self.came_later.items()}
 
@@ -81,15 +81,15 @@ class GridTask(Task):
 
     @property
     def resting_action(self) -> NDArray[np.float64]:
-        """The action that stays where it is."""
+        """The action of staying in place."""
         return np.asarray(np.eye(len(MOVES))[STAY])
 
     def tiles(self, world: Any) -> NDArray[np.float64]:
-        """(N, N, 3) path (1 or 0) and both channels of every tile as they are now."""
+        """(N, N, 3) current path (1 or 0) and both channels of every tile."""
         return np.asarray(np.stack([world.path, *world.signals], axis=2))
 
     def snapshot(self, world: Any) -> Snapshot:
-        """Tiles, agent and targets as they are now."""
+        """The current tiles, agent and targets."""
         return self.tiles(world), (int(world.agent[ROW]), int(world.agent[COLUMN])), self.targets(world)
 
     def camera(self, width: int, height: int) -> Camera:
@@ -126,7 +126,7 @@ def observe(world, observation):  # type: ignore[no-untyped-def]
 
 @compiled_lean
 def move(path: NDArray[np.int64], agent: NDArray[np.int64], action: NDArray[np.float64]) -> bool:
-    """Take the step with the largest value, or stay in front of a wall; counts the step.
+    """Take the step with the largest value, or stay if a wall is in the way; counts the step.
 
     Returns whether all values were finite; if not, nothing moves.
     """
@@ -137,7 +137,7 @@ def move(path: NDArray[np.int64], agent: NDArray[np.int64], action: NDArray[np.f
             return False
         if action[k] > action[choice]:
             choice = k
-    # A step into a wall stays, and counts all the same.
+    # A step into a wall leaves the agent in place, but counts.
     row = agent[ROW] + ROW_STEPS[choice]
     column = agent[COLUMN] + COLUMN_STEPS[choice]
     if path[row, column] == 1:
