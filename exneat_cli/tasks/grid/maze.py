@@ -25,8 +25,7 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 SPARE_STEPS = 2
 """Steps allowed beyond the fastest way (Zhang, 2025, section 3.2.1)."""
 GOAL_ROW, GOAL_COLUMN, FASTEST, FURTHEST, START_ROW, START_COLUMN = range(6)
-"""Entries of `Maze.goal`: its place, its walking distance from the start, the largest distance in the maze, the
-start."""
+"""Entries of `Maze.goal`: its place, walking distance from the start, largest distance in the maze, the start."""
 
 
 class Maze(NamedTuple):

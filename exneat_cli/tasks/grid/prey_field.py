@@ -19,8 +19,7 @@ from exneat_cli.tasks.grid.world import COLUMN_STEPS, ROW_STEPS, draw_tiles
 
 LONGEST_FLIGHT = 7
 FLIGHT_CHANCE = np.cumsum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0) / np.sum(np.arange(1, LONGEST_FLIGHT + 1) ** -2.0)
-"""Cumulative probability of flights of 1 to LONGEST_FLIGHT tiles; that of each length is proportional to length **
--2."""
+"""Cumulative probability of flights of 1 to LONGEST_FLIGHT tiles; a length's own is proportional to length ** -2."""
 PATCH_SD = 1.0
 """Width of the bell of an emission, in tiles."""
 DRAWS_PER_NUMBER = 4

@@ -1,4 +1,4 @@
-"""Ant, Gymnasium's four-legged body, with the settings that the thesis has."""
+"""Ant, Gymnasium's four-legged body, with the settings of the thesis."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from exneat_cli.tasks.robots.robot import RobotTask
 
 @dataclass(frozen=True)
 class AntTask(RobotTask):
-    """Gymnasium's Ant-v5 as the thesis has it; parameters as of any robot.
+    """Gymnasium's Ant-v5 as used in the thesis; the parameters are those of any robot.
 
     By position, x ahead and y to the left, leg 1 is front left, leg 2 back left, leg 3 back right and leg 4 front
-    right, whatever the names of the model's bodies say.
+    right; the names of the model's bodies differ.
     """
 
     name: str = "ant"
@@ -23,7 +23,7 @@ class AntTask(RobotTask):
     reward: str = "thesis"
 
     def identity(self) -> dict[str, Any]:
-        """The parameters; those that came later count only where they change Ant as it always was."""
+        """The parameters; those that were added later are left out where they keep the original Ant."""
         later = ("model", "frame", "symmetry", "contact_forces", "parts", "control_period")
         now, before = self.to_plain(), AntTask().to_plain()
         return {key: value for key, value in super().identity().items() if key not in later or now[key] != before[key]}

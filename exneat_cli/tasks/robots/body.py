@@ -1,9 +1,9 @@
-"""The trunk and the parts of a MuJoCo body, which parts are alike, and the frame in which each of them senses.
+"""The trunk and the parts of a MuJoCo body, which parts are alike, and how they are related.
 
-Two parts are alike if one becomes the other by a shift along the trunk, by a turn about the trunk's vertical axis
-where three or more such parts stand evenly around it, or by mirroring left and right. Parts that are alike may share
-a network: Valsalam and Miikkulainen, "Evolving symmetry for modular system design", 2011, found that symmetric legs
-are learned faster on flat ground; Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024.
+Two parts are alike if one becomes the other by a shift along the trunk, by a turn about the trunk's vertical axis (if
+three or more such parts are spaced evenly around it), or by mirroring left and right. Parts that are alike may share a
+network: Valsalam and Miikkulainen, "Evolving symmetry for modular system design", 2011, found that symmetric legs are
+learned faster on flat ground; Su et al., "Leveraging symmetry in RL-based legged locomotion control", 2024.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from exneat_cli.tasks.robots.likeness import MIRROR, Pose, Relation, relate
 
 SYMMETRIES = ("turn", "mirror")
 LONGEST_NAME = 100
-"""Characters of a model's names that are shown."""
+"""Maximum number of characters of a model's names that are shown."""
 _JOINT_ACTUATORS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
@@ -28,9 +28,9 @@ class Limb(NamedTuple):
     """A part of a body.
 
     Attributes:
-        name: of its first body in the model, or of where it stands.
-        likeness: number of the class of alike parts that it belongs to.
-        relation: what maps the first part of its class to it; also lists its bodies, joints and actuators.
+        name: the name of its first body in the model, or its position in words.
+        likeness: number of its class of alike parts.
+        relation: how the first part of its class maps to it; also lists its bodies, joints and actuators.
         position: (x, y, z) of its first joint from the trunk, x ahead, y to the left, z up, in metres.
     """
 
@@ -41,14 +41,14 @@ class Limb(NamedTuple):
 
 
 class Body(NamedTuple):
-    """A robot, taken apart.
+    """A robot, divided into its trunk and parts.
 
     Attributes:
         trunk: the body that carries the root joints.
         root: the root joints: a free one, or the slides and the hinge of a planar body.
-        core: bodies of the trunk, with all that belong to no part.
-        limbs: the parts in the order that was asked for.
-        symmetries: those of `SYMMETRIES` that relate some of its parts.
+        core: bodies of the trunk, including all that belong to no part.
+        limbs: the parts in the requested order.
+        symmetries: those in `SYMMETRIES` that relate some of its parts.
     """
 
     trunk: int
@@ -70,15 +70,15 @@ def take_apart(
 
     Args:
         model: of the robot.
-        order: ``position``: from front to back, left before right; ``model``: as the model numbers their bodies.
-        symmetry: ``turn`` or ``mirror``, what relates parts that no shift relates; None takes mirrorings where there
-            are any.
-        parts: names of each part's bodies, each of which brings along all that hangs on it; None finds the parts.
-        by_place: call parts by where they stand, though their first bodies have names of their own.
+        order: ``position``: from front to back, left before right; ``model``: in the order of the model's bodies.
+        symmetry: ``turn`` or ``mirror``, the relation between parts that no shift relates; None takes mirroring where
+            possible.
+        parts: names of each part's bodies, each of which includes all of its descendants; None finds the parts.
+        by_place: name parts by their position even if their first bodies have names.
 
     Raises:
-        ConfigError: the model has no root, no actuators or ones of another kind than joints', or `parts` or `symmetry`
-            do not fit it.
+        ConfigError: the model has no root, no actuators, or actuators that do not drive joints, or `parts` or
+            `symmetry` do not fit it.
     """
     trunk, root = find_root(model)
     pose = Pose(model, trunk)
@@ -112,10 +112,10 @@ def take_apart(
 
 
 def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
-    """The body that the whole robot hangs on, and its root joints; the most driven one where several could be it.
+    """The body from which the whole robot descends, and its root joints; of several, the one with most driven joints.
 
     Raises:
-        ConfigError: no body moves freely or in a plane, or an actuator drives something else than a joint.
+        ConfigError: no body moves freely or in a plane, or an actuator drives something other than a joint.
     """
     if not model.nu:
         raise ConfigError("task.model", "a model with actuators", "none", "add motors in its <actuator> section")
@@ -140,7 +140,7 @@ def find_root(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
 
 
 def _is_planar(model: mujoco.MjModel, body: int, joints: Sequence[int]) -> bool:
-    """Whether they are two slides and a hinge that MuJoCo measures in the world's axes and from an upright trunk."""
+    """Whether the joints are two slides and a hinge along the world's axes, at 0 for an upright trunk."""
     slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
     if [int(model.jnt_type[j]) for j in joints] != [slide, slide, hinge]:
         return False
@@ -152,7 +152,7 @@ def _is_planar(model: mujoco.MjModel, body: int, joints: Sequence[int]) -> bool:
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hang on it, parents before children."""
+    """A body and all of its descendants, parents before children."""
     bodies = [root]
     for body in range(root + 1, model.nbody):  # a model numbers children after their parents
         if model.body_parentid[body] in bodies:
@@ -161,7 +161,7 @@ def subtree(model: mujoco.MjModel, root: int) -> list[int]:
 
 
 def _outermost(pose: Pose, trunk: int) -> list[int]:
-    """The first bodies of the parts: the trunk goes on while two or more driven subtrees hang on its middle plane."""
+    """The first bodies of the parts; bodies in the middle plane with several driven subtrees belong to the trunk."""
     model = pose.model
     driven = {int(model.jnt_bodyid[joint]) for joint in model.actuator_trnid[:, 0]}
 
@@ -186,7 +186,7 @@ def _outermost(pose: Pose, trunk: int) -> list[int]:
 
 
 def check_parts(parts: object) -> None:
-    """Refuse parts that do not name their bodies with a `ConfigError`; None is no choice."""
+    """Refuse parts that do not name their bodies with a `ConfigError`; None stands for no choice."""
     for name, bodies in check_section("task.parts", {} if parts is None else parts).items():
         if not isinstance(bodies, list | tuple) or not bodies or not all(isinstance(body, str) for body in bodies):
             raise ConfigError(f"task.parts.{name}", "a list of names of bodies, e.g. [thigh]", bodies)
@@ -219,7 +219,7 @@ def _from_front_to_back(pose: Pose, part: Sequence[int]) -> tuple[float, ...]:
 
 
 def _unique_names(names: list[str], pose: Pose, parts: Sequence[Sequence[int]]) -> list[str]:
-    """The names, if all are there and differ; else words for where the parts stand, numbered where they repeat."""
+    """The names, if all exist and differ; else the parts' positions in words, numbered where they repeat."""
     if all(names) and len(set(names)) == len(names):
         return names
     words = [place_in_words(pose, part) for part in parts]
@@ -227,7 +227,7 @@ def _unique_names(names: list[str], pose: Pose, parts: Sequence[Sequence[int]]) 
 
 
 def place_in_words(pose: Pose, part: Sequence[int]) -> str:
-    """Where a part stands, e.g. ``front_left``; ``middle`` below the trunk's origin."""
+    """A part's position in words, e.g. ``front_left``; ``middle`` if it is above or below the trunk's origin."""
     x, y, _ = pose.place(part)
     ahead = "front" if x > pose.tolerance else "back" if x < -pose.tolerance else ""
     aside = "left" if y > pose.tolerance else "right" if y < -pose.tolerance else ""
@@ -237,7 +237,7 @@ def place_in_words(pose: Pose, part: Sequence[int]) -> str:
 def _turn(
     pose: Pose, one: tuple[int, ...], other: tuple[int, ...], parts: Sequence[tuple[int, ...]]
 ) -> Relation | None:
-    """What turns a part into another, if they and all others that a turn makes of it stand evenly around the trunk."""
+    """The turn from a part to another, if all parts that it turns into are spaced evenly around the trunk."""
     related = {part: r for part in parts if (r := _turned(pose, one, part))}
     if len(related) < 3 or one == other or other not in related:
         return None
@@ -265,5 +265,5 @@ def _itself(pose: Pose, part: Sequence[int]) -> Relation:
 
 
 def printable(name: str) -> str:
-    """A name of the model as far as it can be shown: files may hold line breaks and names without end."""
+    """The printable part of a model's name: files may contain line breaks and names of any length."""
     return "".join(filter(str.isprintable, name))[:LONGEST_NAME]

@@ -1,6 +1,6 @@
-"""The compiled episode of a robot: reset, rewind, observe, sense, drive, step and locate over MuJoCo's own memory.
+"""The compiled episode of a robot: reset, rewind, observe, sense, drive, step and locate on MuJoCo's own memory.
 
-Written over index lists and sizes taken from the model. Follows Gymnasium's v5 environments (Farama Foundation, 2024)
+It uses index lists and sizes from the model, and follows Gymnasium's v5 environments (Farama Foundation, 2024)
 operation by operation, so that results agree to the last bits.
 """
 
@@ -25,8 +25,8 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 _SYMBOLS = ("mj_step", "mj_forward", "mj_resetData", "mj_rnePostConstraint")
 _LIBRARY_PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 
-# MuJoCo's C functions; each takes the addresses of an mjModel and an mjData. `types.ExternalFunction` keeps the
-# symbol's name instead of an address, so code that calls it can be cached between processes.
+# MuJoCo's C functions; each takes the addresses of an mjModel and an mjData. `types.ExternalFunction` holds the
+# symbol's name instead of an address, so that code that calls it can be cached between processes.
 _functions: list[Any] = [types.ExternalFunction(name, types.void(types.int64, types.int64)) for name in _SYMBOLS]
 mj_step, mj_forward, mj_resetData, mj_rnePostConstraint = _functions
 
@@ -47,22 +47,22 @@ class RobotWorld(NamedTuple):
     cfrc_ext: NDArray[np.float64]  #: (nbody, 6), N m and N
     warnings: NDArray[np.int32]  #: counters
     initial_qpos: NDArray[np.float64]  #: the pose that a reset disturbs
-    start_qpos: NDArray[np.float64]  #: what the reset made of it
+    start_qpos: NDArray[np.float64]  #: the pose after the reset
     start_qvel: NDArray[np.float64]
-    positions: NDArray[np.int64]  #: entries of `qpos` that are read
+    positions: NDArray[np.int64]  #: entries of `qpos` that are observed
     velocities: NDArray[np.int64]  #: entries of `qvel`
-    bodies: NDArray[np.int64]  #: whose contact forces are read
-    frames: Frames  #: how readings become what parts sense
-    trunk: int  #: body whose place counts
-    masses: NDArray[np.float64]  #: (nbody,) whose common centre's speed counts; (0,) where the trunk's does
-    along: int  #: entry of `qpos` whose speed counts; -1 where the trunk's does
+    bodies: NDArray[np.int64]  #: bodies whose contact forces are observed
+    frames: Frames  #: how readings become the values that parts sense
+    trunk: int  #: body whose position counts
+    masses: NDArray[np.float64]  #: (nbody,) if the speed of the centre of mass counts; (0,) if the trunk's does
+    along: int  #: entry of `qpos` whose speed counts; -1 if the trunk's does
     middle: NDArray[np.float64]  #: (nu,) control of an action of 0
-    span: NDArray[np.float64]  #: (nu,) what an action of 1 adds
+    span: NDArray[np.float64]  #: (nu,) added by an action of 1
     substeps: int  #: physics steps per control step
     control_period: float  #: seconds per control step
     reset_scale: float  #: half-width of the uniform noise on positions (rad, m)
     normal: bool  #: whether noise on velocities is normal with this sd, not uniform
-    height: int  #: entry of `qpos` that is the trunk's height; -1 where nothing is unhealthy
+    height: int  #: entry of `qpos` that is the trunk's height; -1: every height is healthy
     above: float  #: m to add to it
     lowest: float  #: healthy height of the trunk in m
     highest: float
@@ -77,10 +77,10 @@ class RobotWorld(NamedTuple):
     cost_limit: float  #: contact forces are clipped to this in the contact cost
     largest_contact_cost: float
     max_steps: int  #: control steps after which an episode ends
-    progress: float  #: m without which an episode ends after `patience` steps
-    patience: int  #: 0: never
+    progress: float  #: m that must be gained within `patience` steps, or the episode ends
+    patience: int  #: steps; 0: never
     clock: NDArray[np.int64]  #: (3,), see `STEPS`, `STUCK_STEPS` and `WARNINGS`
-    mark: NDArray[np.float64]  #: (1,), x in m that progress is measured from
+    mark: NDArray[np.float64]  #: (1,), x in m from which progress is measured
 
 
 @functools.cache
@@ -88,7 +88,7 @@ def load_library() -> None:
     """Let compiled code call MuJoCo: load the library that its Python bindings use into LLVM as well.
 
     Raises:
-        ExneatError: its library is not beside its Python bindings, cannot be loaded or lacks a function.
+        ExneatError: the library is not in the directory of the Python bindings, cannot be loaded or lacks a function.
     """
     directory = Path(mujoco.__file__).parent
     libraries = [path for pattern in _LIBRARY_PATTERNS for path in sorted(directory.glob(pattern))]
@@ -99,11 +99,11 @@ def load_library() -> None:
         llvmlite.binding.load_library_permanently(str(libraries[0]))
     except RuntimeError as error:
         raise ExneatError(f"MuJoCo: {libraries[0].name} could not be loaded: {error}\n  {fix}") from error
-    # Compiled code that calls what is not there would take the process down.
+    # Compiled code that calls a missing function would crash the process.
     missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
     if missing:
         raise ExneatError(f"MuJoCo: {libraries[0].name} has no {', '.join(missing)}\n  {fix}")
-    # Else MuJoCo would write MUJOCO_LOG.TXT into the working directory; its counters still count.
+    # Otherwise MuJoCo would write MUJOCO_LOG.TXT into the working directory; its warning counters are not affected.
     mujoco.set_mju_user_warning(lambda message: None)
 
 
@@ -123,13 +123,13 @@ def reset(world: RobotWorld, rng: Generator) -> None:
 
 @compiled
 def rewind(world: RobotWorld) -> None:
-    """Put the body back to where the last reset had put it."""
-    # MuJoCo forgets all that the episode left behind.
+    """Put the body back to where the last reset put it."""
+    # Clears everything that the last episode left in MuJoCo's memory.
     mj_resetData(world.model, world.data)
     world.clock[STEPS] = 0
     world.clock[STUCK_STEPS] = 0
     world.clock[WARNINGS] = np.sum(world.warnings)
-    # Assigning slices would do the same, and take seconds to compile; so loops are written out, here and below.
+    # Slice assignments would take seconds to compile; so loops are written out, here and below.
     for i in range(world.qpos.size):
         world.qpos[i] = world.start_qpos[i]
     for i in range(world.qvel.size):
@@ -141,7 +141,7 @@ def rewind(world: RobotWorld) -> None:
 
 @compiled
 def observe(world: RobotWorld, observation: NDArray[np.float64]) -> None:
-    """Write positions but for the place on the ground, velocities, and clipped contact forces."""
+    """Write positions (except the place on the ground), velocities, and clipped contact forces."""
     k = 0
     for i in world.positions:
         observation[k] = world.qpos[i]
@@ -157,20 +157,20 @@ def observe(world: RobotWorld, observation: NDArray[np.float64]) -> None:
 
 @compiled
 def sense(world: RobotWorld, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
-    """Write what the parts sense in their own frames."""
+    """Write the values that the parts sense in their own frames."""
     sense_in_frames(world.frames, readings, sensed)
 
 
 @compiled
 def drive(world: RobotWorld, action: NDArray[np.float64]) -> None:
-    """Turn an action in the parts' own sense into one in the joints'."""
+    """Convert an action from the parts' signs to the joints', in place."""
     for i in range(action.size):
         action[i] *= world.frames.action_signs[i]
 
 
 @compiled
 def step(world: RobotWorld, action: NDArray[np.float64], terms: NDArray[np.float64]) -> int:
-    """Do one control step; `terms`, (4,), become its forward, healthy, control and contact reward."""
+    """Do one control step; write its forward, healthy, control and contact rewards to `terms`, (4,)."""
     for i in range(action.size):
         if not np.isfinite(action[i]):
             return FAILED
@@ -180,12 +180,12 @@ def step(world: RobotWorld, action: NDArray[np.float64], terms: NDArray[np.float
         mj_step(world.model, world.data)
     # mj_step leaves the contact forces of bodies uncomputed.
     mj_rnePostConstraint(world.model, world.data)
-    # An exploding body makes MuJoCo warn and reset itself, and would go on earning the healthy reward.
+    # An unstable simulation makes MuJoCo warn and reset itself, and would go on earning the healthy reward.
     if np.sum(world.warnings) != world.clock[WARNINGS]:
         return FAILED
     if not (np.isfinite(world.qpos).all() and np.isfinite(world.qvel).all()):
         return FAILED
-    # The episode ends with a fall or a jump, in time, or when training sees no progress.
+    # The episode ends with a fall or a jump, when time is up, or when there is no progress in training.
     healthy = _healthy(world)
     _reward(world, before, healthy, terms)
     world.clock[STEPS] += 1
@@ -196,11 +196,11 @@ def step(world: RobotWorld, action: NDArray[np.float64], terms: NDArray[np.float
 
 @compiled
 def _place(world):  # type: ignore[no-untyped-def]
-    """X in m of what has to move: a slide, the centre of mass, or the trunk."""
+    """X in m of the slide, the centre of mass or the trunk, whichever counts."""
     if world.along >= 0:
         return world.qpos[world.along]
     if world.masses.size == 0:
-        return world.xpos[world.trunk, 0]  # lags behind qpos after RK4 steps; Gymnasium takes it
+        return world.xpos[world.trunk, 0]  # lags behind qpos after RK4 steps, but is what Gymnasium uses
     moment, mass = 0.0, 0.0
     for body in range(world.masses.size):
         moment += world.masses[body] * world.xipos[body, 0]
@@ -246,7 +246,7 @@ def _reward(world, before, healthy, terms):  # type: ignore[no-untyped-def]
 
 @compiled
 def _stuck(world):  # type: ignore[no-untyped-def]
-    # The mark moves along with every bit of progress, and the count starts again.
+    # With sufficient progress the mark moves along and the count starts again.
     x = world.xpos[world.trunk, 0]
     if x >= world.mark[0] + world.progress:
         world.mark[0] = x

@@ -1,9 +1,9 @@
 """What each part senses in its own frame: its joints with their signs, and the trunk as seen from the part.
 
-Readings are in the world's axes, but for the angular velocity of a free trunk, which MuJoCo gives in the trunk's. Where
-alike parts share a network, each has to see the same numbers in the same situation: joints take the signs that
+Readings are in the world's axes, except for the angular velocity of a free trunk, which MuJoCo gives in the trunk's
+axes. Alike parts that share a network must see the same numbers in the same situation: joints take the signs that
 `likeness` finds, vectors are turned or mirrored into the part's frame, and pseudovectors (torques, angular velocities)
-change their sign too where the frame is mirrored.
+also change their sign if the frame is mirrored.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ VIEW = (
     *(("trunk velocity", "m/s", axis, False) for axis in range(3)),
     *(("trunk angular velocity", "rad/s", axis, True) for axis in range(3)),
 )
-"""What a view of the trunk consists of, 13 numbers: name, unit, axis (-1: none), whether it is of a pseudovector."""
+"""The 13 numbers of a view of the trunk: name, unit, axis (-1: none), whether it belongs to a pseudovector."""
 
 
 class Frames(NamedTuple):
-    """What compiled code turns, and where it puts it.
+    """Which readings become which sensed values, for compiled code.
 
-    S readings take a sign only, V triples are vectors in the world's axes, and the trunk is seen from F frames.
+    S readings only take a sign, V triples are vectors in the world's axes, and the trunk is seen from F frames.
     """
 
     height: int  #: reading of the trunk's height; -1 if it has none
@@ -40,7 +40,7 @@ class Frames(NamedTuple):
     axes: NDArray[np.float64]  #: (velocities, 3) in the world
     spin: int  #: first reading of the angular velocity
     moves: NDArray[np.float64]  #: (F, 3, 3) from each frame's axes to the trunk's
-    views: NDArray[np.int64]  #: (F, 13) where each number goes, see `VIEW`; -1: nowhere
+    views: NDArray[np.int64]  #: (F, 13) sensed value of each number in `VIEW`; -1: none
     scalar_from: NDArray[np.int64]  #: (S,)
     scalar_to: NDArray[np.int64]
     scalar_sign: NDArray[np.float64]
@@ -53,7 +53,7 @@ class Frames(NamedTuple):
 
 @compiled
 def sense_in_frames(frames: Frames, readings: NDArray[np.float64], sensed: NDArray[np.float64]) -> None:
-    """Write what all parts sense in their own frames."""
+    """Write the values that all parts sense in their own frames."""
     for k in range(frames.scalar_from.size):
         sensed[frames.scalar_to[k]] = frames.scalar_sign[k] * readings[frames.scalar_from[k]]
     rotation = np.empty((3, 3))  # from the trunk's axes to the world's
@@ -88,7 +88,7 @@ def _write_rotation(frames, readings, rotation):  # type: ignore[no-untyped-def]
     if frames.free:
         o = frames.orientation
         w, x, y, z = readings[o], readings[o + 1], readings[o + 2], readings[o + 3]
-        length = np.sqrt(w * w + x * x + y * y + z * z)  # noise takes it away from 1
+        length = np.sqrt(w * w + x * x + y * y + z * z)  # not 1 with sensor noise
         if length == 0.0:
             w, length = 1.0, 1.0
         w, x, y, z = w / length, x / length, y / length, z / length

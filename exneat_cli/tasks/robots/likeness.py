@@ -1,7 +1,8 @@
-"""Whether one part of a MuJoCo body becomes another one by a shift, a turn or a mirroring, and with which signs.
+"""Whether a shift, a turn or mirroring maps one part of a MuJoCo body to another, and with which signs.
 
 A hinge's axis is a pseudovector: mirroring left and right reverses hinges about x and z, but not those about y.
-A joint's sign makes its axis what the move makes of the other part's; ranges and actuators go with it.
+A joint's sign is 1 if the move maps the other part's axis to its own, -1 if to the opposite; ranges and actuators
+follow it.
 """
 
 from __future__ import annotations
@@ -14,31 +15,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 _PLACES = 1e-3
-"""Of the model's extent: places nearer to each other than this are the same, and so are directions (as sines)."""
+"""Share of the model's extent: closer places count as the same, and so do directions (as sines)."""
 _SHARE = 0.2
 """Masses, moments of inertia about any axis, damping, friction loss and armature may differ by this share of the
 larger one, stiffness by this share of the body's largest: the armature of Humanoid's hips differs by 20%, and one of
 its knees has a spring of 1 N m/rad, the other none, beside hips of 20."""
 _ROUND_OFF = 1e-6
-"""Relative tolerance of what must be equal: ranges, gears, sizes, friction."""
+"""Relative tolerance for values that must be equal: ranges, gears, sizes, friction."""
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SHAPED_AXES: dict[int, list[int]] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): [],
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): [2],
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): [2],
 }
-"""Which of a geom's axes its shape shows; all three for shapes not named here."""
+"""Axes of a geom whose direction its shape shows; all three for shapes not named here."""
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Exchanges left and right."""
 
 
 class Relation(NamedTuple):
-    """What maps a class' first part to one that is alike, whose members come in that first part's order.
+    """How a class' first part maps to an alike one, whose members are listed in the first part's order.
 
     Attributes:
         name: ``itself``, ``shift``, ``turn`` or ``mirror``.
-        move: (3, 3) orthogonal: what it does to vectors in the trunk's axes.
-        bodies: their numbers in the model; so below.
+        move: (3, 3) orthogonal matrix that maps vectors in the trunk's axes.
+        bodies: their numbers in the model, as for joints and actuators.
         joints: hinges and slides.
         joint_signs: 1 or -1 for each.
         actuators: those of the joints.
@@ -79,7 +80,7 @@ class Pose:
         return range(first, first + int(self.model.body_jntnum[body]))
 
     def geoms_of(self, body: int) -> range:
-        """Numbers of the geoms that a body consists of."""
+        """Numbers of a body's geoms."""
         first = int(self.model.body_geomadr[body])
         return range(first, first + int(self.model.body_geomnum[body]))
 
@@ -88,7 +89,7 @@ class Pose:
         return [int(a) for a in np.flatnonzero(self.model.actuator_trnid[:, 0] == joint)]
 
     def place(self, part: Sequence[int]) -> NDArray[np.float64]:
-        """(3,) where the first joint of these bodies is; where the first body is if they have none."""
+        """(3,) position of the first joint of these bodies, or of the first body if they have no joints."""
         joints = [joint for body in part for joint in self.joints_of(body)]
         return np.asarray(self.anchors[joints[0]] if joints else self.bodies[part[0]])
 
@@ -96,14 +97,14 @@ class Pose:
 def relate(
     pose: Pose, name: str, move: NDArray[np.float64], one: Sequence[int], other: Sequence[int]
 ) -> Relation | None:
-    """Compare two parts after a move, which a shift along x may follow unless it is a turn; None if they are not alike.
+    """Compare two parts after a move and, unless it is a turn, a shift along x; None if they are not alike.
 
     Args:
         pose: of the body.
         name: of the move, for the relation.
         move: (3, 3) orthogonal.
         one: bodies of the first part, parents before children.
-        other: bodies of the part that the first one may become.
+        other: bodies of the part to which the first one may map.
     """
     shift = pose.place(other) - move @ pose.place(one)
     if len(one) != len(other) or np.abs(shift if name == "turn" else shift[1:]).max() > pose.tolerance:
@@ -138,7 +139,7 @@ def relate(
 
 
 class _Comparison(NamedTuple):
-    """Compares what belongs to a part, after a move, with what belongs to another."""
+    """Compares the members of one part, after a move, with those of another."""
 
     pose: Pose
     move: NDArray[np.float64]
@@ -175,7 +176,7 @@ class _Comparison(NamedTuple):
         return bool(np.all(moved > 1.0 - _PLACES**2)) and all(_equal(values[one], values[other]) for values in equal)
 
     def joints(self, one: int, other: int) -> list[tuple[int, int, int]]:
-        """Each joint of a body, the other body's, and its sign, 0 if they differ."""
+        """Each joint of a body, the other body's joint, and the sign; 0 if they differ."""
         pairs = zip(self.pose.joints_of(one), self.pose.joints_of(other), strict=True)
         return [(a, b, self.joint_sign(a, b)) for a, b in pairs]
 
@@ -199,7 +200,7 @@ class _Comparison(NamedTuple):
         return sign if all(alike) else 0
 
     def actuators(self, one: int, other: int, sign: int) -> list[tuple[int, int]]:
-        """The actuators of joint `other` with their signs, 0 where they differ from those of joint `one`."""
+        """The actuators of joint `other` with their signs; 0 if they differ from those of joint `one`."""
         model = self.pose.model
         ours, others = self.pose.actuators_of(one), self.pose.actuators_of(other)
         if len(ours) != len(others):
@@ -220,7 +221,7 @@ class _Comparison(NamedTuple):
 
 
 def _signed(limits: NDArray[np.float64], sign: int) -> NDArray[np.float64]:
-    """(2,) the lower and the upper limit of what has changed its sign."""
+    """(2,) lower and upper limit after multiplication by the sign."""
     return limits if sign > 0 else -limits[::-1]
 
 
@@ -229,11 +230,11 @@ def _equal(one: Any, other: Any) -> bool:
 
 
 def _near(one: float, other: float, largest: float = 0.0) -> bool:
-    """Whether two positive numbers differ little, beside the larger of them or one that is larger still."""
+    """Whether two positive numbers differ little, relative to the larger of them or to a still larger one."""
     return bool(abs(one - other) <= _SHARE * max(one, other, largest) + 1e-12)
 
 
 def _near_about_any_axis(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """The same for (3, 3) inertias: for the moments u' I u of both, about all directions u."""
+    """The same for (3, 3) inertias: compares the moments u' I u about all directions u."""
     least = [np.linalg.eigvalsh(a - (1.0 - _SHARE) * b)[0] for a, b in ((one, other), (other, one))]
     return bool(min(least) >= -1e-6 * max(np.trace(one), np.trace(other)))

@@ -1,6 +1,6 @@
-"""Where a robot's model comes from, and the rules of its episodes: names for Gymnasium's and our own, or a file.
+"""A robot's model, by name (Gymnasium's and our own) or from a file, and the rules of its episodes.
 
-Rules of names are those of Gymnasium's v5 environments (Farama Foundation, 2024).
+Gymnasium's models have the rules of its v5 environments (Farama Foundation, 2024).
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ import mujoco
 from exneat_cli.errors import ConfigError, check_path
 
 LARGEST = 64 * 2**20
-"""Bytes that a model and the files it includes may have together."""
+"""Maximum total size of a model and the files that it includes (bytes)."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What an episode of a robot is like.
+    """The rules of a robot's episodes.
 
     Attributes:
         control_period: seconds per control step.
-        heights: healthy range of the trunk's height in m, None for 0.4 to 2 times the initial one.
-        steepest: healthy size of a planar trunk's angle in rad.
-        largest: healthy size of velocities, and of positions from the third on.
-        speed: whose speed counts: of the ``trunk``, of its first joint (``slide``) or of the ``mass``.
-        reset_scale: noise on the initial pose.
-        normal: whether it is normal on velocities, else uniform as on positions.
-        forward_weight, healthy_reward, control_weight, contact_weight: of the full reward.
+        heights: healthy range of the trunk's height in m; None for 0.4 to 2 times the initial height.
+        steepest: limit of a planar trunk's healthy angles in rad.
+        largest: limit of healthy velocities, and of healthy positions from the third on.
+        speed: whose speed counts: that of the ``trunk``, its first joint (``slide``) or the centre of ``mass``.
+        reset_scale: size of the noise on the initial pose.
+        normal: whether this noise is normal on velocities; otherwise it is uniform, as on positions.
+        forward_weight, healthy_reward, control_weight, contact_weight: weights of the full reward.
         cost_limit: contact forces (N, N m) are clipped to this in the contact cost.
-        largest_contact_cost: what the contact cost of a step is cut to.
-        named_by_place: whether parts are called by where they stand, because their bodies' names mislead.
+        largest_contact_cost: upper limit of the contact cost of a step.
+        named_by_place: whether parts are named by their position, because the names of their bodies mislead.
     """
 
     control_period: float = 0.05
@@ -97,7 +97,7 @@ NAMED: dict[str, tuple[str, Rules]] = {
     ),
     "hexapod": ("hexapod.xml", Rules()),
 }
-"""File and rules of each model that has a name."""
+"""File and rules of each named model."""
 
 
 def rules_of(model: str) -> Rules:
@@ -130,11 +130,11 @@ def _shipped(model: str) -> Path:
 
 _Stamp = tuple[int, int] | None
 _seen: dict[Path, dict[Path, _Stamp]] = {}
-"""All files of each model that was read, by its main one, and what tells their contents from others."""
+"""All files of each model read so far, by main file, with stamps that tell whether they have changed."""
 
 
 def _state(model: str) -> tuple[Path, tuple[tuple[Path, _Stamp], ...]]:
-    """The model's file, and all of its files as they are now: a program may run for long, and files change."""
+    """The model's file, and the current state of all of its files, which may change while a program runs."""
     main = path_of(model).resolve()
     if any(_stamp(path) != stamp for path, stamp in _seen.get(main, {main: None}).items()):
         _seen[main] = {path: _stamp(path) for path in _paths(main)}
@@ -153,7 +153,7 @@ def _paths(main: Path) -> list[Path]:
     """The file and all that it includes.
 
     Raises:
-        ConfigError: one of them is missing or cannot be read, it is no MJCF, or they are too large.
+        ConfigError: one of them is missing or cannot be read, the file is not MJCF, or they are too large.
     """
     with _reading(main):
         _refuse_large([main])
@@ -174,10 +174,10 @@ def _reading(main: Path) -> Iterator[None]:
 
 
 def files_of(model: str) -> dict[str, bytes]:
-    """The model's file and all that it includes, by their paths below the directory that holds them all.
+    """The model's file and all that it includes, by their paths below their common directory.
 
     Raises:
-        ConfigError: one of them is missing, cannot be read, is no MJCF, or they are too large.
+        ConfigError: one of them is missing, cannot be read or is not MJCF, or they are too large.
     """
     return _files(*_state(model))
 
@@ -204,7 +204,7 @@ def digest_of(model: str) -> str:
 
 
 def load(model: str) -> mujoco.MjModel:
-    """The compiled model, the same object as long as none of its files changes.
+    """The compiled model; the same object as long as none of its files changes.
 
     Raises:
         ConfigError: its files cannot be used, see `files_of`, or MuJoCo refuses them.
@@ -214,7 +214,7 @@ def load(model: str) -> mujoco.MjModel:
 
 @functools.lru_cache(maxsize=16)
 def _load(path: Path, _: tuple[tuple[Path, _Stamp], ...]) -> mujoco.MjModel:
-    mujoco.set_mju_user_warning(lambda message: None)  # else MuJoCo writes MUJOCO_LOG.TXT
+    mujoco.set_mju_user_warning(lambda message: None)  # otherwise MuJoCo writes MUJOCO_LOG.TXT
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

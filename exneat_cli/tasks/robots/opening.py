@@ -1,4 +1,4 @@
-"""A robot's anatomy, and a world of it for compiled code to step."""
+"""A robot's anatomy, and the opening of its worlds for compiled code."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from exneat_cli.tasks.robots.sensing import Sensing, in_own_frames, in_the_world
 FORCE_LIMIT = 1.0
 """Contact forces (N) and torques (N m) are clipped to this, as in Gymnasium's Ant-v5."""
 HEALTHY_SHARES = (0.4, 2.0)
-"""Of the trunk's initial height: the healthy range of a model without rules of its own."""
+"""Healthy range of a model without rules of its own, as multiples of the trunk's initial height."""
 
 
 class Anatomy(NamedTuple):
-    """A robot taken apart, what its sensors read, and what of that each part senses."""
+    """A robot's body, what its sensors read, and what each part senses of it."""
 
     body: Body
     readings: Readings
@@ -46,7 +46,7 @@ def anatomy_of(
 
 
 def control_range(model: mujoco.MjModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(nu,) the controls of an action of 0, and (nu,) what an action of 1 adds."""
+    """(nu,) the controls for an action of 0, and (nu,) what an action of 1 adds."""
     low, high = np.where(model.actuator_ctrllimited[:, None], model.actuator_ctrlrange, (-1.0, 1.0)).T
     return 0.5 * (low + high), 0.5 * (high - low)
 
@@ -54,7 +54,7 @@ def control_range(model: mujoco.MjModel) -> tuple[NDArray[np.float64], NDArray[n
 def open_world(
     model: mujoco.MjModel, anatomy: Anatomy, rules: Rules, *, substeps: int, **settings: Any
 ) -> tuple[RobotWorld, mujoco.MjData]:
-    """Open a world, and the simulation that it points into; `settings` are those of its fields that a task decides."""
+    """Open a world, and the MuJoCo data that it points into; `settings` are the fields that the task determines."""
     data, (body, readings, sensing) = mujoco.MjData(model), anatomy
     frames = sensing.frames
     middle, span = control_range(model)

@@ -1,4 +1,4 @@
-"""Robots as pictures, by MuJoCo's renderer; a camera follows the trunk."""
+"""Pictures of robots, from MuJoCo's renderer; the camera follows the trunk."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 DISTANCE = 2.8
-"""Of the camera, as a multiple of how far the body reaches from its trunk."""
+"""Distance of the camera, as a multiple of how far the body extends from its trunk."""
 BODY, PLANAR = (115.0, -22.0), (90.0, -8.0)
-"""Azimuth and elevation in degrees: from behind and above the right side, or straight at the plane; x leads right."""
+"""Azimuth and elevation in degrees: from above and behind the right side, or straight at the plane; x points right."""
 
 
 class RobotCamera:
@@ -20,7 +20,7 @@ class RobotCamera:
 
     Args:
         model: the body and its surroundings.
-        trunk: the body that is followed.
+        trunk: the body that the camera follows.
         width, height: pixels.
     """
 
@@ -37,14 +37,14 @@ class RobotCamera:
         self._camera.distance = DISTANCE * self._reach
         self._camera.azimuth, self._camera.elevation = BODY if is_free else PLANAR
         self._renderer = mujoco.Renderer(model, height, width)
-        atexit.register(self._renderer.close)  # OSMesa complains of one that is closed after Python's own shutdown
+        atexit.register(self._renderer.close)  # OSMesa prints errors if it is closed after Python's own shutdown
 
     def draw(self, snapshot: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """(height, width, 3) of positions, (nq,)."""
+        """(height, width, 3) the picture of a pose, (nq,)."""
         self._data.qpos[:] = snapshot
         mujoco.mj_forward(self._model, self._data)
         top = float((self._data.geom_xpos[:, 2] + self._model.geom_rbound)[self._moving].max())
-        # Height stays, so that a hopping body is seen to hop, unless it would leave the picture.
+        # The camera's height is fixed, so that hops are visible, unless the body would leave the picture.
         height = max(0.8 * self._height, top - self._reach)
         self._camera.lookat[:] = (*self._data.xpos[self._trunk, :2], height)
         self._renderer.update_scene(self._data, self._camera)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exneat_cli.tasks.robots.body import Body, printable, subtree
 
 FORCES = (("torque", "N m"), ("force", "N"))
-"""Vectors of MuJoCo's `cfrc_ext` per body, three entries each, in the world's axes."""
+"""Vectors of MuJoCo's `cfrc_ext` for each body, three entries each, in the world's axes."""
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -21,10 +21,10 @@ class Readings(NamedTuple):
 
     Attributes:
         names: of all entries, without units.
-        units: of all entries; empty for what has none.
-        positions: which entries of `qpos` are read, in order: all but the root's place on the ground.
-        velocities: which entries of `qvel`.
-        bodies: whose contact forces, six each; empty where none are sensed.
+        units: of all entries; empty for those without one.
+        positions: entries of `qpos` that are read, in order: all except the root's place on the ground.
+        velocities: entries of `qvel` that are read.
+        bodies: those whose contact forces are read, six each; empty if none are sensed.
     """
 
     names: tuple[str, ...]
@@ -43,7 +43,7 @@ class Readings(NamedTuple):
         return len(self.positions) + int(np.flatnonzero(self.velocities == address)[0])
 
     def forces(self, bodies: Iterable[int]) -> list[int]:
-        """Indices of the first of the six contact forces of each body; none where they are not sensed."""
+        """Index of the first of the six contact forces of each body whose contact forces are sensed."""
         first = len(self.positions) + len(self.velocities)
         sensed = self.bodies.tolist()
         return [first + 3 * len(FORCES) * sensed.index(body) for body in bodies if body in sensed]
@@ -55,12 +55,12 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def body_name(model: mujoco.MjModel, body: int) -> str:
-    """What a body is called in the names of sensors."""
+    """A body's name in the names of sensors."""
     return printable(model.body(body).name) or f"body {body}"
 
 
 def joint_name(model: mujoco.MjModel, joint: int) -> str:
-    """What a joint is called in the names of sensors and actuators."""
+    """A joint's name in the names of sensors and actuators."""
     return printable(model.joint(joint).name) or f"joint {joint}"
 
 
@@ -79,7 +79,7 @@ def actuator_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def read_off(model: mujoco.MjModel, body: Body, *, contact_forces: bool) -> Readings:
-    """The entries for a robot: of all joints of its bodies but for the place on the ground, x and y."""
+    """The readings of a robot: all joints of its bodies, except the place on the ground, x and y."""
     bodies = subtree(model, body.trunk)
     positions: list[tuple[int, str, str]] = []
     velocities: list[tuple[int, str, str]] = []

@@ -1,7 +1,7 @@
 """Any MuJoCo body that learns to walk along +x: Gymnasium's by name, our hexapod, or a model file of your own.
 
-What is sensed, entry by entry with its unit, what drives what, which parts are alike and which geometries follow from
-that: ``exneat inspect task=robot task.model=...``. An action runs from -1 to 1 over each actuator's range.
+``exneat inspect task=robot task.model=...`` shows all sensed values with their units, which part drives what, which
+parts are alike, and the geometries that fit. An action from -1 to 1 covers each actuator's range.
 
 Scoring: the fitness of an episode is its forward reward, the sum of dx / dt over the control steps. The full reward
 adds the healthy reward and subtracts the costs of effort and contact.
@@ -27,10 +27,10 @@ from exneat_cli.tasks.task import Adapter, Camera, Part, Simulation, Task, setti
 
 REWARDS = ("thesis", "gymnasium")
 THESIS_CONTROL_WEIGHT = 0.01
-"""Weight of sum(control^2) under ``reward=thesis``: its full reward is about 900 above its forward reward over 1000
-steps, which leaves room for 0.01 (Zhang, 2025, table 5.5); Gymnasium's default for Ant is 0.5."""
+"""Weight of sum(control^2) with ``reward=thesis``: the thesis' full reward exceeds its forward reward by about 900 over
+1000 steps, which is consistent with 0.01 (Zhang, 2025, table 5.5); Gymnasium's default for Ant is 0.5."""
 LONGEST_PERIOD = 10.0
-"""Seconds that a control step may last."""
+"""Maximum duration of a control step (s)."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class RobotTask(Task):
     Attributes:
         name: always ``robot``.
         model: path of an MJCF file, or a name in `models.NAMED`.
-        part_order: ``position`` orders the parts from front to back, left before right; ``model`` as the model does.
-        frame: ``world``: every part senses readings as they are; ``part``: each one in its own frame.
-        symmetry: ``turn`` or ``mirror``, what relates alike parts; None follows from the geometry.
+        part_order: ``position``: from front to back, left before right; ``model``: in the model's order.
+        frame: ``world``: every part senses unchanged readings; ``part``: each one senses in its own frame.
+        symmetry: ``turn`` or ``mirror``, the relation between alike parts; None derives it from the geometry.
         contact_forces: whether contact forces are sensed.
         part_bodies: names of each part's bodies, by the part's name; None finds the parts.
-        control_period: seconds per control step, at most 10, None for the model's own.
-        reward: weights of the full reward, ``gymnasium`` or ``thesis`` (with less cost of effort).
+        control_period: seconds per control step, at most 10; None for the model's own.
+        reward: weights of the full reward, ``gymnasium`` or ``thesis`` (with a lower cost of effort).
         max_steps: control steps after which an episode ends.
         progress: metres along x that count as progress, in training only.
         patience: steps without progress, at most 1000000, that end a training episode; 0 never ends one.
@@ -104,7 +104,7 @@ class RobotTask(Task):
 
     @property
     def whole(self) -> tuple[int, ...]:
-        """Entries that a single network senses: of all parts and of the trunk, each once."""
+        """Entries that a single network senses: those of all parts and of the trunk, without duplicates."""
         if self.frame == "world":
             return super().whole
         own = {entry for part in (*self.parts, self.trunk) for entry in part.sensors}
@@ -112,11 +112,11 @@ class RobotTask(Task):
 
     @property
     def sensor_names(self) -> tuple[str, ...]:
-        """Name and unit of what is sensed, entry by entry, e.g. ``hip_1 position (rad)``."""
+        """Names of the sensed values, with units, e.g. ``hip_1 position (rad)``."""
         return self._anatomy.sensing.names
 
     def remarks_on(self, part: Part) -> dict[str, str]:
-        """Its bodies, which part it is alike, and its joints with the signs that it senses them with."""
+        """The part's bodies, the part that it resembles, and its joints with the signs with which it senses them."""
         model, body = load(self.model), self._anatomy.body
         if part == self.trunk:
             return {"bodies": ", ".join(body_name(model, each) for each in body.core)}
@@ -138,12 +138,12 @@ class RobotTask(Task):
 
     @property
     def sensed_size(self) -> int:
-        """Number of entries that parts sense."""
+        """Number of sensed values."""
         return len(self._anatomy.sensing.names)
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
-        """The joints that are driven, in the order of the action, with what an action of 1 gives them."""
+        """The driven joints, in the order of the action, with the torque or force of an action of 1."""
         return actuator_names(load(self.model))
 
     @property
@@ -152,11 +152,11 @@ class RobotTask(Task):
         return self.max_steps
 
     def usual_reset_scale(self) -> float:
-        """Noise on the initial pose as the model's rules have it."""
+        """Noise on the initial pose according to the model's rules."""
         return self._rules.reset_scale
 
     def identity(self) -> dict[str, Any]:
-        """The parameters, with the model by its content."""
+        """The parameters, with a digest of the model's files in place of its name."""
         return {**super().identity(), "model": digest_of(self.model)}
 
     def files(self) -> dict[str, bytes]:
@@ -165,12 +165,12 @@ class RobotTask(Task):
 
     @classmethod
     def found_in(cls, section: Mapping[str, Any], directory: Path) -> dict[str, Any]:
-        """Parameters as a run recorded them, with the model that it keeps in `directory`."""
+        """Parameters as recorded by a run, with the model that it stores in `directory`."""
         kept = sorted(directory.rglob(Path(str(section.get("model"))).name)) if directory.is_dir() else []
         return {**section, "model": str(kept[0])} if kept else dict(section)
 
     def shared_by(self, subpopulations: Sequence[int]) -> RobotTask:
-        """With `symmetry` decided: turns if some sharers are alike by nothing else, else mirrorings."""
+        """The task with its symmetry: turns if only these relate some parts that share a genome, else mirroring."""
         body = self._anatomy.body
         if self.frame == "world" or self.symmetry is not None or not body.symmetries:
             return self
@@ -187,7 +187,7 @@ class RobotTask(Task):
         return np.asarray(np.sum(totals, axis=-1))
 
     def metres_of(self, fitness: float) -> float:
-        """Distance along x that an episode with this forward reward led (m)."""
+        """Distance along x in an episode with this forward reward (m)."""
         return fitness / self._rules.forward_weight * self.step_seconds
 
     @property
@@ -200,7 +200,7 @@ class RobotTask(Task):
         return self.open_disturbed(training=training, reset_scale=self.usual_reset_scale())
 
     def open_disturbed(self, *, training: bool, reset_scale: float) -> Simulation:
-        """Open a new world with noise of this size on the initial pose; training ends once there is no progress."""
+        """Open a new world with noise of this size on the initial pose; training episodes end without progress."""
         dynamics.load_library()
         model = load(self.model)
         world, data = open_world(
@@ -218,7 +218,7 @@ class RobotTask(Task):
         return Simulation(world, *functions, sense=sense, drive=drive, owner=(model, data))
 
     def snapshot(self, world: dynamics.RobotWorld) -> NDArray[np.float64]:
-        """(nq,) the pose."""
+        """(nq,) the current pose."""
         return world.qpos.copy()
 
     def camera(self, width: int, height: int) -> Camera:
@@ -228,7 +228,7 @@ class RobotTask(Task):
         return RobotCamera(load(self.model), self._anatomy.body.trunk, width, height)
 
     def adapter(self) -> Adapter:
-        """Parts' own frames, and the range of the controls."""
+        """The parts' own frames, and the range of the controls."""
         model, readings = load(self.model), self._anatomy.readings
         frames = self._anatomy.sensing.frames if self.frame == "part" else None
         signs = np.ones(len(self.actuator_names)) if frames is None else frames.action_signs
@@ -236,7 +236,7 @@ class RobotTask(Task):
         return Adapter(names, frames, signs, *control_range(model), bounded=False)
 
     def open_batch(self, count: int, device: str, *, training: bool, reset_scale: float | None, room: int) -> Any:
-        """Open `count` worlds on a device, with `room` times the usual room for contacts.
+        """Open `count` worlds on a device, with `room` times the usual room for contacts and constraints.
 
         Raises:
             ConfigError: MuJoCo Warp cannot simulate the model.

@@ -1,4 +1,4 @@
-"""Which entries of what is sensed belong to which part of a robot, in the world's axes or in the parts' own frames."""
+"""Which sensed values belong to which part of a robot, in the world's axes or in the parts' own frames."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from exneat_cli.tasks.task import Part
 
 
 class Sensing(NamedTuple):
-    """What is sensed, and by whom.
+    """The sensed values, and the parts that sense them.
 
     Attributes:
-        names: of all entries, with units. In parts' own frames, entries of one name are one number.
+        names: of all entries, with units. In the parts' own frames, entries with the same name have the same value.
         parts: in the body's order.
         trunk: the trunk's own entries, and the actuators of its own joints.
-        frames: how readings become entries, where they are not the entries.
+        frames: how readings become sensed values, where these differ.
     """
 
     names: tuple[str, ...]
@@ -35,7 +35,7 @@ class Sensing(NamedTuple):
 
 
 def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensing:
-    """Every part senses its readings as they are."""
+    """Every part senses its readings unchanged."""
 
     def entries(joints: Iterable[int], bodies: Iterable[int]) -> tuple[list[int], list[int]]:
         moved = [_entries_of_joint(model, readings, joint) for joint in joints]
@@ -57,7 +57,7 @@ def in_the_world(model: mujoco.MjModel, body: Body, readings: Readings) -> Sensi
 
 
 class _Layout:
-    """The entries so far, and where each of them comes from."""
+    """The sensed values so far, and where each of them comes from."""
 
     def __init__(self, model: mujoco.MjModel, readings: Readings) -> None:
         self.model, self.readings = model, readings
@@ -81,7 +81,7 @@ class _Layout:
         return found
 
     def add_forces(self, bodies: Iterable[int], frame: int, move: NDArray[np.float64]) -> list[int]:
-        """Torque and force on each body, turned into a frame by its move."""
+        """Torque and force on each body, in the frame with this move."""
         found = []
         for body in bodies:
             for first in self.readings.forces([body]):
@@ -177,7 +177,7 @@ def _free_trunk(model: mujoco.MjModel, body: Body, readings: Readings) -> dict[s
 
 
 def _planar_trunk(model: mujoco.MjModel, body: Body, readings: Readings) -> dict[str, Any]:
-    """The same of a trunk on two slides and a hinge."""
+    """The same for a trunk on two slides and a hinge."""
     pose = Pose(model, body.trunk)
     *slides, hinge = body.root
     rising = [j for j in slides if abs(pose.axes[j][2]) > 0.5]
@@ -195,7 +195,7 @@ def _planar_trunk(model: mujoco.MjModel, body: Body, readings: Readings) -> dict
 
 
 def _varying(model: mujoco.MjModel, body: Body) -> list[int]:
-    """Which numbers of a view vary: in a plane, only what lies in it, and turns about its normal."""
+    """Numbers of a view that can vary: for a planar trunk, vectors in the plane and turns about its normal."""
     if len(body.root) == 1:
         return list(range(len(VIEW)))
     normal = np.abs(model.jnt_axis[body.root[-1]]) > 0.5  # the hinge's axis
@@ -210,7 +210,7 @@ def _varying(model: mujoco.MjModel, body: Body) -> list[int]:
 
 
 def _mirrored_joints(pose: Pose, layout: _Layout, limb: Limb, joints: list[int]) -> list[int]:
-    """The entries that a mirrored part reads of this one's joints: of a limb on the middle plane with other signs."""
+    """The entries that a mirrored part reads of this one's joints: for a limb on the middle plane, with other signs."""
     bodies = limb.relation.bodies
     image = relate(pose, "mirror", MIRROR, bodies, bodies)
     if image is None:
@@ -222,7 +222,7 @@ def _mirrored_joints(pose: Pose, layout: _Layout, limb: Limb, joints: list[int])
 
 
 def _direction(move: NDArray[np.float64], axis: int, is_pseudo: bool) -> str:
-    """Where an axis of a frame points, seen from the trunk: a mirrored frame's pseudovectors count the other way."""
+    """Where an axis of a frame points, seen from the trunk; pseudovectors are reversed in a mirrored frame."""
     handedness = np.linalg.det(move) if is_pseudo else 1.0
     x, y, z = move[:, axis] * handedness
     turns_about = "about " if is_pseudo else ""
@@ -234,14 +234,14 @@ def _direction(move: NDArray[np.float64], axis: int, is_pseudo: bool) -> str:
 
 
 def _sign_under(pose: Pose, move: NDArray[np.float64], joint: int) -> int:
-    """-1 if a move reverses the axis of a joint of the trunk, 1 if it keeps it or makes another axis of it."""
+    """-1 if a move reverses the axis of a joint of the trunk, 1 if it keeps the axis or maps it to another one."""
     axis, kind = pose.axes[joint], int(pose.model.jnt_type[joint])
     handedness = np.linalg.det(move) if kind != int(mujoco.mjtJoint.mjJNT_SLIDE) else 1.0
     return -1 if float(move @ axis @ axis) * handedness < -0.999 else 1
 
 
 def _entries_of_joint(model: mujoco.MjModel, readings: Readings, joint: int) -> tuple[list[int], list[int]]:
-    """Indices of the readings of a joint's positions, as far as they are read, and velocities."""
+    """Indices of the readings of a joint's positions, where they are read, and of its velocities."""
     widths = {int(mujoco.mjtJoint.mjJNT_FREE): (7, 6), int(mujoco.mjtJoint.mjJNT_BALL): (4, 3)}
     positions, velocities = widths.get(int(model.jnt_type[joint]), (1, 1))
     first, speed = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])

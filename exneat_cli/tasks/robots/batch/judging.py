@@ -1,4 +1,4 @@
-"""The kernel that judges control steps: rewards, health and the ends of episodes, as `dynamics` does for one world."""
+"""The kernel that judges control steps: rewards, health and the ends of episodes, as in `dynamics` for one world."""
 
 import warp as wp
 
@@ -7,7 +7,7 @@ from exneat_cli.tasks.task import ENDED, FAILED, RUNNING
 wp.set_module_options({"enable_backward": False})
 
 LARGEST_STATE = wp.constant(1.0e10)
-"""MuJoCo's mjMAXVAL: it warns of larger positions, velocities and accelerations, and resets the world."""
+"""MuJoCo's mjMAXVAL: beyond it, positions, velocities and accelerations cause a warning and a reset of the world."""
 _RUNNING, _ENDED, _FAILED = wp.constant(RUNNING), wp.constant(ENDED), wp.constant(FAILED)
 
 
@@ -110,7 +110,7 @@ def judge(
     status: wp.array(dtype=int),
     terms: wp.array2d(dtype=float),
 ):
-    """Write the reward terms of each running world, (W, 4), and how it stands now."""
+    """Write the reward terms, (W, 4), and the status of each running world."""
     w = wp.tid()
     if status[w] != _RUNNING:
         return
@@ -127,7 +127,7 @@ def judge(
     terms[w, 2] = -rules.control_weight * effort
     terms[w, 3] = -_contact_cost(rules, force, w)
     place[w] = now
-    # The mark moves along with every bit of progress, and the count starts again.
+    # With sufficient progress the mark moves along and the count starts again.
     x = xpos[w, rules.trunk][0]
     if x >= mark[w] + rules.progress:
         mark[w] = x

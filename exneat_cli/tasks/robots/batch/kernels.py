@@ -1,4 +1,4 @@
-"""Kernels of a batch of robots: what `dynamics` and `frames` do for one world, for W of them, in single precision.
+"""Kernels for a batch of W robots: the functions of `dynamics` and `frames`, in single precision.
 
 Every sum within a world runs in a fixed order on one thread, so that results do not depend on other worlds.
 """
@@ -14,7 +14,7 @@ _RUNNING, _FAILED = wp.constant(RUNNING), wp.constant(FAILED)
 
 @wp.struct
 class Sensors:
-    """What is read: entries of positions and velocities, and bodies with their contact forces."""
+    """The readings: entries of positions and velocities, and bodies whose contact forces are read."""
 
     positions: wp.array(dtype=int)
     velocities: wp.array(dtype=int)
@@ -24,7 +24,7 @@ class Sensors:
 
 @wp.struct
 class View:
-    """`exneat_cli.tasks.robots.frames.Frames`, but for the joints."""
+    """`exneat_cli.tasks.robots.frames.Frames`, without the joints."""
 
     height: int
     above: float
@@ -56,7 +56,7 @@ def reset(
     mark: wp.array(dtype=float),
     clock: wp.array2d(dtype=int),
 ):
-    """Put each world with begins >= 0 to that row of `starts`: qpos, qvel, acceleration, place and x of the trunk."""
+    """Reset each world with begins >= 0 to that row of `starts`: qpos, qvel, acceleration, place and x of the trunk."""
     w = wp.tid()
     row = begins[w]
     if row < 0:
@@ -113,7 +113,7 @@ def sense_joints(
     readings: wp.array2d(dtype=float),
     sensed: wp.array2d(dtype=float),
 ):
-    """Write what takes a sign only."""
+    """Write the sensed values that only take a sign."""
     w, k = wp.tid()
     sensed[w, target[k]] = sign[k] * readings[w, source[k]]
 
@@ -190,7 +190,7 @@ def drive(
     status: wp.array(dtype=int),
     ctrl: wp.array2d(dtype=float),
 ):
-    """Turn the action of each world into controls; a world fails where one is not finite, and others hold still."""
+    """Turn the action of each world into controls; it fails if one is not finite, and idle worlds hold still."""
     w = wp.tid()
     acts = status[w] == _RUNNING
     for i in range(ctrl.shape[1]):

@@ -1,7 +1,8 @@
-"""What MuJoCo Warp leaves to chance, or does differently: contacts and constraints, put right between its stages.
+"""Contacts and constraints that MuJoCo Warp orders by chance, or computes differently, corrected between its stages.
 
-MuJoCo Warp appends contacts of all worlds to one pool, and the rows of a world's constraints to its table, as threads
-come. Sums over rows then depend on chance. Sorting both by what they are makes a world's numbers its own.
+MuJoCo Warp appends the contacts of all worlds to one pool, and the rows of a world's constraints to its table, in the
+order in which threads arrive. Sums over rows would then vary at random. Both are therefore sorted by what they belong
+to, so that a world's results depend on nothing else.
 """
 
 from typing import Any
@@ -18,9 +19,9 @@ _CAPSULE = wp.constant(int(mujoco.mjtGeom.mjGEOM_CAPSULE))
 
 @wp.func
 def _aligned(rotation: wp.mat33, frame: wp.mat33):
-    """The frame of a contact of a capsule with a plane, turned along the capsule, as MuJoCo has it.
+    """The frame of a contact of a capsule with a plane, turned along the capsule, as in MuJoCo.
 
-    MuJoCo Warp 4.0 leaves steep capsules out, and the pyramids that stand for cones of friction then differ.
+    MuJoCo Warp 4.0 does not do so for steep capsules, whose pyramidal friction cones then differ.
     """
     axis = wp.vec3(rotation[0, 2], rotation[1, 2], rotation[2, 2])
     normal = wp.vec3(frame[0, 0], frame[0, 1], frame[0, 2])
@@ -43,7 +44,7 @@ def list_contacts(
     counts: wp.array(dtype=int),
     listed: wp.array2d(dtype=int),
 ):
-    """Enter each contact of the pool into the list of its world, and put its frame right."""
+    """Enter each contact of the pool in the list of its world, and correct its frame."""
     c = wp.tid()
     if c >= wp.min(found[0], world_of.shape[0]):
         return
@@ -104,7 +105,7 @@ def order_rows(
     order: wp.array2d(dtype=int),
     moved: wp.array(dtype=int),
 ):
-    """Say which row of each world comes where: by kind and number of what it belongs to, then contact by contact."""
+    """Write the order of each world's rows: by kind and number of what they belong to, then contact by contact."""
     w = wp.tid()
     first_contact = equalities[w] + frictions[w] + limits[w]
     last = wp.min(rows[w], order.shape[1])
@@ -140,7 +141,7 @@ def order_rows(
                     if row != k:
                         changed = 1
                     k += 1
-    if k != last:  # rows that nobody claims: leave everything where it is
+    if k != last:  # some rows belong to no known contact: leave all rows where they are
         changed = 0
     moved[w] = changed
 
@@ -162,7 +163,7 @@ def set_aside(
     frictionloss: wp.array2d(dtype=float),
     speed: wp.array2d(dtype=float),
 ):
-    """Copy each row that is to move, (W, rows, nv + 9), in its new order."""
+    """Copy the rows of worlds whose order changes, in the new order, to `numbers`, (W, rows, nv + 9)."""
     w, k = wp.tid()
     if moved[w] == 0 or k >= wp.min(rows[w], order.shape[1]):
         return
@@ -198,7 +199,7 @@ def put_back(
     frictionloss: wp.array2d(dtype=float),
     speed: wp.array2d(dtype=float),
 ):
-    """Write what `set_aside` copied."""
+    """Write back the rows that `set_aside` copied."""
     w, k = wp.tid()
     if moved[w] == 0 or k >= wp.min(rows[w], order.shape[1]):
         return
@@ -233,7 +234,7 @@ def add_contact_forces(
     centres: wp.array2d(dtype=wp.vec3),
     force: wp.array2d(dtype=wp.spatial_vector),
 ):
-    """Sum up torque and force of the contacts on each body about its tree's centre of mass, as MuJoCo's `cfrc_ext`."""
+    """Sum up contact torques and forces on each body about its tree's centre of mass, like MuJoCo's `cfrc_ext`."""
     w = wp.tid()
     for body in range(force.shape[1]):
         force[w, body] = wp.spatial_vector()

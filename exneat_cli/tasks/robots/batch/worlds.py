@@ -1,4 +1,4 @@
-"""A batch of worlds of one robot: reset, observe, sense, drive and step, as kernels on arrays of W worlds."""
+"""A batch of W worlds of one robot: reset, observe, sense, drive and step as kernels on arrays."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from exneat_cli.tasks.robots.dynamics import RobotWorld, rewind
 from exneat_cli.tasks.task import Simulation
 
 CONTACTS, ROWS = 32, 64
-"""Room per world for contacts and for rows of constraints, unless a limit was exceeded and both are doubled."""
+"""Room per world for contacts and for rows of constraints; both are doubled if it is exceeded."""
 _LACKS_ROOM = sum(mujoco_warp.OverflowType[name] for name in ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD"))
-"""Bits of MuJoCo Warp's overflows that more room would have spared."""
+"""Bits of those of MuJoCo Warp's overflows that more room can avoid."""
 
 
 class RobotWorlds:
@@ -28,18 +28,18 @@ class RobotWorlds:
 
     Args:
         model: of the robot.
-        simulation: a world of the same task on the CPU, which has the rules and draws the starts.
+        simulation: a world of the same task on the CPU, which provides the rules and draws the starts.
         count: W.
-        device: Warp's name of it.
+        device: Warp's name of the device.
         room: factor of `CONTACTS` and `ROWS`.
 
     Attributes:
-        begins: (W,) row of the starts that a world is to be reset to, -1 for none.
-        status: (W,) of each world, see `exneat_cli.tasks.task`; only running ones act.
+        begins: (W,) row of the starts to which a world is to be reset; -1 for none.
+        status: (W,) status of each world, see `exneat_cli.tasks.task`; only running ones act.
         terms: (W, 4) reward terms of the last step.
-        start_size: entries of a start.
-        readings_size: of an observation.
-        is_framed: whether brains sense something else than the readings.
+        start_size: number of entries of a start.
+        readings_size: number of readings.
+        is_framed: whether brains sense something other than the readings.
 
     Raises:
         ConfigError: MuJoCo Warp cannot simulate the model.
@@ -69,14 +69,14 @@ class RobotWorlds:
         except (NotImplementedError, ValueError) as error:
             raise ConfigError("task.model", "one that MuJoCo Warp can simulate", str(error)[:200]) from error
         self.model.opt.warn_overflow = 0
-        self.model.ncam = self.model.nlight = 0  # nobody looks
+        self.model.ncam = self.model.nlight = 0  # nothing is rendered
         self._cone = int(model.opt.cone)
         listed, rows = CONTACTS * room, self.data.njmax
         self._contacts = wp.zeros(count, dtype=int)
         self._listed = wp.zeros((count, listed), dtype=int)
         self._order = wp.zeros((count, rows), dtype=int)
         self._moved = wp.zeros(count, dtype=int)
-        # Rows of a sparse table have no fixed width: they stay as they come.
+        # Rows of a sparse table have no fixed width, so they are not sorted.
         self._sorts_rows = not self.model.is_sparse
         self._numbers = wp.zeros((count, rows if self._sorts_rows else 0, self.data.efc.J.shape[2] + 9), dtype=float)
         self.model.callback.contactfilter = self._list_contacts
@@ -107,7 +107,7 @@ class RobotWorlds:
         self._rules = _filled(judging.Rules, world, total_mass=float(world.masses.sum()))
 
     def starts(self, episodes: Sequence[EpisodeSeeds]) -> NDArray[np.float32]:
-        """(E, `start_size`) the starts of episodes, drawn as worlds on the CPU draw them."""
+        """(E, `start_size`) the starts of episodes, drawn as on the CPU."""
         return np.array([self._start(seeds) for seeds in episodes], np.float32).reshape(-1, self.start_size)
 
     def resting_start(self) -> NDArray[np.float32]:
@@ -132,7 +132,7 @@ class RobotWorlds:
         return np.concatenate([world.qpos, world.qvel, owner[1].qacc_warmstart, [place, x]]).astype(np.float32)
 
     def reset(self, starts: wp.array) -> None:
-        """Put each world with `begins` >= 0 to that row of `starts`, (starts, `start_size`)."""
+        """Reset each world with `begins` >= 0 to that row of `starts`, (starts, `start_size`)."""
         data = self.data
         state = [data.qpos, data.qvel, data.qacc_warmstart, data.act, data.ctrl]
         own = [self.force, self._place, self._mark, self._clock]
@@ -144,7 +144,7 @@ class RobotWorlds:
         wp.launch(kernels.observe, dim=(self.count, self.readings_size), inputs=values)
 
     def sense(self, readings: wp.array, sensed: wp.array) -> None:
-        """Write what brains sense, (W, at least sensed size); where that is the readings, both are one array."""
+        """Write the sensed values, (W, at least sensed size); if these are the readings, both are the same array."""
         if self.is_framed:
             joints = self._joints[0].shape[0]
             wp.launch(kernels.sense_joints, dim=(self.count, joints), inputs=[*self._joints, readings, sensed])
@@ -155,7 +155,7 @@ class RobotWorlds:
         wp.launch(kernels.drive, dim=self.count, inputs=[*self._drive, action, self.status, self.data.ctrl])
 
     def step(self) -> None:
-        """Do the physics of one control step, and judge it."""
+        """Simulate one control step, and judge it."""
         data = self.data
         for _ in range(self._world.substeps):
             mujoco_warp.step(self.model, data)
@@ -195,7 +195,7 @@ class RobotWorlds:
         wp.launch(ordering.put_back, dim=shape, inputs=[*which, self._numbers, efc.J, *columns])
 
     def note_overflows(self, flag: wp.array) -> None:
-        """Set `flag`, (1,), if room for contacts or rows did not suffice for some world since they were opened."""
+        """Set `flag`, (1,), if any world has exceeded the room for contacts or rows since the worlds were opened."""
         wp.launch(kernels.note_overflows, dim=self.count, inputs=[_LACKS_ROOM, self.data.overflow, flag])
 
 
@@ -205,7 +205,7 @@ def _uploaded(values: NDArray[Any]) -> wp.array:
 
 
 def _filled(kind: Any, source: Any, **others: Any) -> Any:
-    """A struct of Warp's with the fields of a named tuple, and others."""
+    """A Warp struct with the fields of a named tuple, and others."""
     struct, values = kind(), source._asdict() | others
     for name in kind.vars:
         setattr(struct, name, _uploaded(values[name]) if isinstance(values[name], np.ndarray) else values[name])
