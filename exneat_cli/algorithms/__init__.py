@@ -1,4 +1,4 @@
-"""Algorithms behind one contract, `Algorithm`: one file (or folder) each, found by name in `ALGORITHMS`."""
+"""Algorithms with one interface, `Algorithm`: one file (or folder) each, found by name in `ALGORITHMS`."""
 
 from exneat_cli.algorithms.algorithm import Algorithm, Candidate, Problem, Results, Search, State, Team
 from exneat_cli.algorithms.ars import ARS

@@ -1,4 +1,4 @@
-"""What every algorithm offers: its settings, and a search in ask/tell form."""
+"""The interface of every algorithm: its settings, and a search in ask/tell form."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_modules
 
 
 class Team(NamedTuple):
-    """Genomes that are evaluated together, one from each subpopulation in their order.
+    """Genomes that are evaluated together, one from each subpopulation, in order.
 
-    A team that meets the next generation intact keeps its `ids`, those of its genomes.
+    `ids` are those of its genomes; a team that enters the next generation unchanged keeps them.
     """
 
     genomes: tuple[ArrayGenome, ...]
@@ -36,13 +36,14 @@ class Candidate(NamedTuple):
 
 
 class Results(NamedTuple):
-    """What an algorithm is told of T teams in E episodes.
+    """The results of T teams in E episodes, as told to an algorithm.
 
     Attributes:
-        fitness: (T, E); the task's failure floor where an episode failed.
-        failed: (T,) whether an episode of the team failed; such a team is nobody's best.
-        sensed: of the sensor pins of each subpopulation, (pins,) and pooled over teams and modules that share
-            it; only for algorithms that ask for it, see `Algorithm.wants_moments`. Pins that read modules count 0.
+        fitness: (T, E); the task's failure floor for failed episodes.
+        failed: (T,) whether an episode of the team failed; such a team cannot become the champion.
+        sensed: moments of each subpopulation's sensor pins, (pins,), pooled over teams and the modules that share it;
+            only for algorithms that ask for them, see `Algorithm.wants_moments`. Pins that read modules have a count
+            of 0.
     """
 
     fitness: NDArray[np.float64]
@@ -53,7 +54,7 @@ class Results(NamedTuple):
         """Mean fitness of each team.
 
         Raises:
-            ValueError: there are not so many teams, or a mean is not finite.
+            ValueError: the number of teams is not `teams`, or a mean is not finite.
         """
         if len(self.fitness) != teams:
             raise ValueError(f"tell: expected {teams} fitness values, got {len(self.fitness)}")
@@ -66,17 +67,17 @@ class Results(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """What a search is about.
+    """The problem that a search is to solve.
 
     Attributes:
-        plan: who senses and drives what.
-        evolution: how genomes begin, change and compete.
+        plan: what each module senses and drives.
+        evolution: how genomes start, change and compete.
         population: teams per generation.
-        episodes: of each team and generation.
-        pairing: ``rank``, ``parents`` or ``index``, how subpopulations form teams.
+        episodes: episodes per team and generation.
+        pairing: ``rank``, ``parents`` or ``index``: how genomes form teams.
         seed: root of all random streams.
-        judging: ``last`` or ``mean``, which episodes of a team that survives count.
-        champion: ``thesis`` or ``race``, which teams are candidates.
+        judging: ``last`` or ``mean``: which episodes of a surviving team count.
+        champion: ``thesis`` or ``race``: which teams are candidates.
     """
 
     plan: Plan
@@ -90,14 +91,14 @@ class Problem:
 
 
 State = tuple[dict[str, Any], dict[str, NDArray[Any]]]
-"""A search between two generations, as data: numbers, strings, lists and dicts, and columns of numbers by name."""
+"""The state of a search between generations, as data: numbers, strings, lists and dicts, and arrays by name."""
 
 
 def finite(columns: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """A column of finite numbers of this shape, from a file of anyone's.
+    """A column of finite numbers of this shape, from an untrusted file.
 
     Raises:
-        KeyError, ValueError: there is none.
+        KeyError, ValueError: there is no such column.
     """
     column = columns[name]
     if column.dtype != np.float64 or column.shape != shape or not np.isfinite(column).all():
@@ -106,61 +107,61 @@ def finite(columns: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...
 
 
 class Search(ABC):
-    """An algorithm at work. A generation is one or more turns of `ask` and `tell`."""
+    """A run of an algorithm. A generation takes one or more turns of `ask` and `tell`."""
 
     @abstractmethod
     def ask(self) -> tuple[Sequence[Team], int]:
-        """The teams to evaluate next, and how many episodes each of them gets, the same ones for all.
+        """The teams to evaluate next, and the number of episodes, which are the same for all of them.
 
         Raises:
-            RuntimeError: the last ones were not told.
+            RuntimeError: the results of the last teams have not been told.
         """
 
     @abstractmethod
     def tell(self, results: Results) -> bool:
-        """Take what the teams of the last `ask` got, in its order; returns whether the generation is over.
+        """Take the results of the teams of the last `ask`, in its order; returns whether the generation is over.
 
         Raises:
-            RuntimeError: nothing was asked for.
+            RuntimeError: no teams have been asked for.
             ValueError: the number of teams is wrong, or a fitness is not finite.
         """
 
     @abstractmethod
     def candidates(self) -> list[Candidate]:
-        """Teams that it would hand over now, the best first; none of them failed."""
+        """The current candidates for the champion, the best first; none of them failed."""
 
     @abstractmethod
     def state(self) -> State:
-        """All that the rest of the search depends on, after a generation; taking it changes nothing."""
+        """Everything on which the rest of the search depends, after a generation; has no side effects."""
 
     def columns(self) -> dict[str, int | float]:
-        """Its own columns of history.csv for the generation that is over."""
+        """The algorithm's own columns of history.csv for the last generation."""
         return {}
 
 
 class Algorithm(ABC):
-    """An algorithm's settings, a frozen dataclass with range checks; the base of those that train modules.
+    """An algorithm's settings, as a frozen dataclass with range checks; the base class of all algorithms.
 
     An algorithm that trains defines `start` and `restored`; one without training names a `rule`.
     """
 
     modular: bool = True
-    """Whether geometry, linkage and wiring mean anything for it."""
+    """Whether geometry, linkage and wiring apply to it."""
 
     name: str
     """Its name in `conf/algorithm` and in run directories."""
 
     def wants_moments(self, evolution: EvolutionSettings) -> bool:
-        """Whether it is told the statistics of what its networks sense, `Results.sensed`."""
+        """Whether it needs the statistics of the sensed values, `Results.sensed`."""
         return False
 
     @property
     def rule(self) -> str | None:
-        """What acts instead of trained networks, see `exneat_cli.brains.rules`; None where something is trained."""
+        """The rule that acts in place of trained networks, see `exneat_cli.brains.rules`; None if it trains."""
         return None
 
     def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
-        """Who senses and drives what.
+        """The plan of what each module senses and drives.
 
         Raises:
             ConfigError: the combination makes no sense.
@@ -168,28 +169,28 @@ class Algorithm(ABC):
         return plan_modules(task, geometry, linkage, wiring, hidden=evolution.module_hidden)
 
     def usual_evolution(self, evolution: EvolutionSettings) -> EvolutionSettings:
-        """Settings of evolution where the user gives none, from those that suit the task."""
+        """The defaults of the settings of evolution, derived from those of the task."""
         return evolution
 
     def identity_of(self, evolution: EvolutionSettings) -> dict[str, Any]:
-        """What its results depend on of these settings: what is hashed; two runs that differ elsewhere are the same."""
+        """Those of these settings on which its results depend, and which are therefore part of a run's hash."""
         return asdict(evolution)
 
-    def check(self, problem: Problem) -> None:  # noqa: B027  # most take on any problem
-        """Refuse a problem that it cannot take on; called before anything is written.
+    def check(self, problem: Problem) -> None:  # noqa: B027  # most accept any problem
+        """Refuse a problem that it cannot solve; called before anything is written.
 
         Raises:
-            ConfigError: a setting makes no sense for it.
+            ConfigError: a setting makes no sense for this algorithm.
         """
 
     def start(self, problem: Problem) -> Search:
-        """Begin a search."""
+        """Start a search."""
         raise TypeError(f"{self.name} trains nothing")
 
     def restored(self, problem: Problem, state: State) -> Search:
-        """The search of this `problem` that `state` was taken of: from `Search.state`, or from a file of anyone's.
+        """The search for this `problem` in `state`, which comes from `Search.state` or from an untrusted file.
 
         Raises:
-            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: it is none, or does not fit.
+            ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the state is invalid or does not fit.
         """
         raise TypeError(f"{self.name} trains nothing")

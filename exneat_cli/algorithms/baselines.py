@@ -1,4 +1,4 @@
-"""Baselines: agents that follow a rule, which nothing trains."""
+"""Baselines: untrained agents that follow a rule."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BASELINES = ("random", "motionless", "linear_fusion")
 
 @dataclass(frozen=True)
 class Baseline(Algorithm):
-    """A rule, which `exneat_cli.brains.rules` resolves by its name."""
+    """A rule, found by its name in `exneat_cli.brains.rules`."""
 
     name: str = "random"
     modular = False
@@ -25,11 +25,11 @@ class Baseline(Algorithm):
 
     @property
     def rule(self) -> str:
-        """Its name."""
+        """The rule's name, which is the algorithm's."""
         return self.name
 
     def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
-        """No modules at all."""
+        """A plan without modules."""
         refuse_modules(self.name, geometry, linkage, wiring)
         if self.name == "linear_fusion" and any(len(part.actuators) != 1 for part in task.parts):
             fix = "it moves to where the sum of a part's sensors is largest, so only grid worlds have it"

@@ -1,4 +1,4 @@
-"""Which teams a search remembers, so that one of them may become the champion."""
+"""Candidates: the teams that a search keeps, one of which may become the champion."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections.abc import Sequence
 from exneat_cli.algorithms.algorithm import Candidate
 
 CHAMPIONS = ("race", "thesis")
-"""``race``: the best teams of all generations race on validation episodes; ``thesis``: those near the best training
-fitness are validated alike (Zhang, 2025, section 3.3)."""
+"""``race``: the best teams of all generations race on validation episodes; ``thesis``: all teams near the best training
+fitness get the same validation (Zhang, 2025, section 3.3)."""
 MARGIN = 0.1
-"""Under ``thesis`` a team is in the hall of fame while its fitness is at least best - MARGIN * |best|."""
+"""With ``thesis``, a team stays in the hall of fame while its fitness is at least best - MARGIN * |best|."""
 CAPACITY = 20
 RACERS = 32
-"""Most candidates of a race."""
+"""Maximum number of candidates in a race."""
 
 
 def with_candidate(hall_of_fame: Sequence[Candidate], offered: Candidate) -> list[Candidate]:
-    """The hall of fame after a team that did not fail was offered to it, which enters if it is good enough.
+    """The hall of fame after a team that did not fail has been offered to it.
 
-    There are at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes, with the
-    best fitness that each ever had; the best first, of equals the earlier one first.
+    It has at most `CAPACITY` teams close to the best fitness so far, unique by the ids of their genomes, each with the
+    best fitness that it ever had; the best come first, and of equals the earlier one.
     """
     entries = {entry.team.ids: entry for entry in hall_of_fame}
     known = entries.get(offered.team.ids)
@@ -32,10 +32,10 @@ def with_candidate(hall_of_fame: Sequence[Candidate], offered: Candidate) -> lis
 
 
 def with_racers(racers: Sequence[Candidate], best: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates of a race after a generation, of which `best` are the best teams, the first one of all.
+    """The candidates of a race after a generation with these `best` teams, the best one first.
 
-    At most `RACERS` teams with the highest fitness that they were last judged to have, unique by the ids of their
-    genomes; the best first, of equals the earlier one first. The first of `best` is among them whatever its fitness.
+    At most `RACERS` teams with the highest fitness, as last judged, unique by the ids of their genomes; the best come
+    first, and of equals the earlier one. The first of `best` is always among them.
     """
     entries = {entry.team.ids: entry for entry in (*racers, *best)}
     ranked = sorted(entries.values(), key=lambda entry: (-entry.fitness, entry.generation))

@@ -1,9 +1,9 @@
-"""CMA-ES: samples from a normal distribution whose mean, step size and covariance follow the best of them.
+"""CMA-ES: samples a normal distribution whose mean, step size and covariance follow the best samples.
 
-Sources: Hansen, "The CMA evolution strategy: a tutorial", 2016 (arXiv 1604.00772); of the separable kind, whose
-covariance is diagonal and whose cost grows with the weights alone, Ros and Hansen, "A simple modification in CMA-ES
-achieving linear time and space complexity", PPSN 2008. The updates are those of the library cmaes (Nomura and Shibata,
-"cmaes: a simple yet practical Python library for CMA-ES", arXiv 2402.01373): both kinds in NumPy alone.
+Sources: Hansen, "The CMA evolution strategy: a tutorial", 2016 (arXiv 1604.00772); for the separable kind, whose
+covariance is diagonal and whose cost is linear in the number of weights, Ros and Hansen, "A simple modification in
+CMA-ES achieving linear time and space complexity", PPSN 2008. The updates are those of the library cmaes (Nomura and
+Shibata, "cmaes: a simple yet practical Python library for CMA-ES", arXiv 2402.01373): both kinds need only NumPy.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from exneat_cli.algorithms.weight_vector import Layout, Vectors
 from exneat_cli.errors import ConfigError, check_choice, check_real
 
 LARGEST_FULL = 300
-"""Weights above which a full covariance matrix costs more than episodes do."""
+"""Number of weights above which a full covariance matrix costs more than the episodes."""
 LEAST_POPULATION = 4
 _KINDS = ("full", "separable")
 
 
 class CovarianceAdaptation(Optimiser):
-    """The library at work; arguments as those of `CMAES`.
+    """The library's update; takes the arguments of `CMAES`.
 
-    A library's state is its own affair: a resumed search is told again what the first one was, from the same seed.
+    The library's state is internal: a resumed search starts from the same seed and is told all earlier fitness again.
     """
 
     def __init__(self, start: Vectors, population: int, seed: SeedSequence, sigma: float, *, full: bool) -> None:
-        from cmaes import CMA, SepCMA  # takes a second, which only those who use it should wait
+        from cmaes import CMA, SepCMA  # takes a second, which should only cost those who use it
 
         kind: Any = CMA if full else SepCMA
         number = int(seed.generate_state(1)[0])
@@ -45,21 +45,21 @@ class CovarianceAdaptation(Optimiser):
         return np.array(self._library.mean)
 
     def ask(self) -> Vectors:
-        """As the library draws them."""
+        """Samples drawn by the library, (population, n)."""
         self._samples = np.array([self._library.ask() for _ in range(self._library.population_size)])
         return self._samples
 
     def tell(self, fitness: Vectors) -> None:
-        """Tell the library, which looks for the lowest value."""
+        """Pass the fitness to the library, which minimises, with its sign reversed."""
         self._told.append(fitness)
         self._library.tell(list(zip(self._samples, (-fitness).tolist(), strict=True)))
 
     def state(self) -> State:
-        """All fitness so far."""
+        """All fitness values so far."""
         return {"updates": len(self._told)}, {"told": np.array(self._told)}
 
     def restore(self, state: State) -> None:
-        """Do all updates again."""
+        """Repeat all updates."""
         plain, columns = state
         for fitness in finite(columns, "told", (int(plain["updates"]), self._library.population_size)):
             self.ask()
@@ -71,8 +71,8 @@ class CMAES(EvolutionStrategy):
     """Settings of CMA-ES.
 
     Attributes:
-        sigma: the first step size, the sd of what a sample adds to each weight, at least 1e-6.
-        covariance: ``full``, for at most 300 weights and biases, or ``separable``; None takes what fits.
+        sigma: the initial step size, the sd of the difference between a sample's weights and the mean, at least 1e-6.
+        covariance: ``full``, for at most 300 weights and biases, or ``separable``; None takes ``full`` if possible.
 
     Raises:
         ConfigError: a value is out of range.
@@ -89,7 +89,7 @@ class CMAES(EvolutionStrategy):
             check_choice("algorithm.covariance", self.covariance, _KINDS)
 
     def check(self, problem: Problem) -> None:
-        """Refuse too small a population, and full matrices that are too large, too."""
+        """Also refuse populations that are too small, and full matrices that are too large."""
         super().check(problem)
         if problem.population < LEAST_POPULATION:
             raise ConfigError("population", f"at least {LEAST_POPULATION} for cma_es", problem.population)
@@ -98,6 +98,6 @@ class CMAES(EvolutionStrategy):
             raise ConfigError("algorithm.covariance", f"full for at most {LARGEST_FULL} weights", "full", fix)
 
     def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:
-        """CMA-ES from there."""
+        """CMA-ES that starts at `start`."""
         full = len(start) <= LARGEST_FULL if self.covariance is None else self.covariance == "full"
         return CovarianceAdaptation(start, population, seed, self.sigma, full=full)

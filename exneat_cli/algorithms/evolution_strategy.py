@@ -1,8 +1,8 @@
 """What evolution strategies share: they move one vector, all weights and biases of a team, by the fitness of samples.
 
-The team is the initial genome of each subpopulation of the plan, so geometry, linkage, frame and central module mean
-what they mean for ExNEAT; its structure stays. An `Optimiser` holds the vector and knows nothing of networks; this file
-turns its samples into teams, whose inputs `Layout` normalises.
+The team consists of the initial genome of each of the plan's subpopulations, so geometry, linkage, frame and central
+module mean the same as for ExNEAT; its structure is fixed. An `Optimiser` holds the vector and knows nothing about
+networks; this file turns its samples into teams, whose inputs `Layout` normalises.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from exneat_cli.tasks import Task
 from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_body, refuse_modules, with_sensed
 
 INITIAL_SD = 0.03
-"""Of weights, where there are hidden nodes; all 0, these would never learn. Without them weights begin at 0, as in
-Mania et al. (2018)."""
+"""Initial sd of weights if there are hidden nodes, which could not learn from weights of 0. Without hidden nodes,
+weights start at 0, as in Mania et al. (2018)."""
 LEAST = 1e-6
-"""Of step sizes and of the noise: less changes nothing that a network would show."""
+"""Minimum of step sizes and noise: smaller ones have no visible effect on a network."""
 _STARTS = ("full_direct", "full_nodirect")
 
 
@@ -35,7 +35,7 @@ class Optimiser(ABC):
     """A search for the vector of highest fitness, in turns of `ask` and `tell`.
 
     Attributes:
-        centre: (n,) where it is; each update puts a new array in its place.
+        centre: (n,) the current vector, replaced by a new array in each update.
     """
 
     centre: Vectors
@@ -46,29 +46,29 @@ class Optimiser(ABC):
 
     @abstractmethod
     def tell(self, fitness: Vectors) -> None:
-        """Move by the finite fitness, (population,), of the last samples: more is better."""
+        """Move according to the fitness of the last samples, (population,), finite and to be maximised."""
 
     @abstractmethod
     def state(self) -> State:
-        """All that the rest depends on, between `tell` and `ask`."""
+        """Everything on which later updates depend, between `tell` and `ask`."""
 
     @abstractmethod
     def restore(self, state: State) -> None:
-        """Bring one that has just begun, from the same arguments, into this state.
+        """Bring a new optimiser with the same arguments into this state.
 
         Raises:
-            ArithmeticError, LookupError, TypeError, ValueError: it is none, or does not fit.
+            ArithmeticError, LookupError, TypeError, ValueError: the state is invalid or does not fit.
         """
 
 
 class MirroredOptimiser(Optimiser):
-    """One whose samples come in pairs: a step along each of some random directions, and one against it.
+    """An optimiser whose samples come in pairs: a step along each of several random directions, and one against it.
 
     Args:
-        start: (n,) where it begins.
-        population: even number of samples.
-        seed: of the directions.
-        noise: length of a step for a direction of standard normal numbers.
+        start: (n,) the initial centre.
+        population: number of samples, even.
+        seed: seed of the directions.
+        noise: factor of a step along a direction of standard normal numbers.
     """
 
     def __init__(self, start: Vectors, population: int, seed: SeedSequence, noise: float) -> None:
@@ -76,7 +76,7 @@ class MirroredOptimiser(Optimiser):
         self._count, self._noise, self._rng = population // 2, noise, generator(seed)
 
     def ask(self) -> Vectors:
-        """One step along each direction, then one against each."""
+        """Samples one step along each direction, then one step against each."""
         self._directions = self._rng.standard_normal((self._count, len(self.centre)))
         steps = self._noise * self._directions
         return np.concatenate([self.centre + steps, self.centre - steps])
@@ -84,12 +84,12 @@ class MirroredOptimiser(Optimiser):
 
 @dataclass(frozen=True)
 class EvolutionStrategy(Algorithm):
-    """Settings that all evolution strategies have.
+    """Settings shared by all evolution strategies.
 
     Attributes:
         name: its name.
-        modular: a module for each part, as the geometry says; False: a single one for everything, as NEAT has.
-        normalise: whether inputs are normalised; None means where networks have biases.
+        modular: whether each part has a module, as in ExNEAT; False means one module for everything, as in NEAT.
+        normalise: whether inputs are normalised; None means yes if networks have biases.
 
     Raises:
         ConfigError: a value is out of range.
@@ -106,22 +106,22 @@ class EvolutionStrategy(Algorithm):
             check_flag("algorithm.normalise", self.normalise)
 
     def wants_moments(self, evolution: EvolutionSettings) -> bool:
-        """Whether inputs may have to be normalised."""
+        """Whether inputs may be normalised."""
         return self.normalise is not False
 
     def usual_evolution(self, evolution: EvolutionSettings) -> EvolutionSettings:
-        """Linear networks, whose outputs are cut to the controls' range."""
+        """Linear networks, whose outputs are clipped to [-1, 1]."""
         start = replace(evolution, initial_connection="full_direct", neat_hidden=0, module_hidden=0)
         return replace(start, output_activation="clamped")
 
     def identity_of(self, evolution: EvolutionSettings) -> dict[str, Any]:
-        """What makes the networks; how evolution changes them means nothing here."""
+        """The settings that determine the networks; those of mutation and selection have no effect here."""
         names = ("feed_forward", "activation_default", "output_activation", "initial_connection")
         hidden = evolution.module_hidden if self.modular else evolution.neat_hidden
         return {name: getattr(evolution, name) for name in names} | {"hidden": hidden, "biases": has_biases(evolution)}
 
     def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
-        """That of ExNEAT, or of NEAT if it is not `modular`."""
+        """The plan of ExNEAT, or that of NEAT if the algorithm is not `modular`."""
         if self.modular:
             return super().plan(task, geometry, linkage, wiring, evolution)
         refuse_modules(f"{self.name} algorithm.modular=false", geometry, linkage, wiring)
@@ -131,8 +131,8 @@ class EvolutionStrategy(Algorithm):
         """Refuse what an evolution strategy cannot do.
 
         Raises:
-            ConfigError: networks do not begin fully connected, inputs are to be normalised without biases, or teams
-                are to be paired or judged by earlier episodes.
+            ConfigError: networks do not start fully connected, inputs are to be normalised without biases, `pairing` is
+                not ``rank``, or `judging` is not ``last``.
         """
         start = problem.evolution.initial_connection
         if start not in _STARTS:
@@ -150,24 +150,24 @@ class EvolutionStrategy(Algorithm):
 
     @abstractmethod
     def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:
-        """Begin at the vector `start`, (n,), with so many samples per update."""
+        """An optimiser that starts at the vector `start`, (n,), with `population` samples per update."""
 
     def start(self, problem: Problem) -> Search:
-        """Begin at small weights."""
+        """Start a search at weights of 0, or at small ones if there are hidden nodes."""
         return StrategySearch(problem, self)
 
     def restored(self, problem: Problem, state: State) -> Search:
-        """The search that `state` was taken of."""
+        """The search in `state`."""
         search = StrategySearch(problem, self)
         search.restore(state)
         return search
 
 
 class MirroredStrategy(EvolutionStrategy):
-    """One whose samples come in pairs, on both sides of the centre."""
+    """An evolution strategy whose samples come in pairs, on both sides of the centre."""
 
     def check(self, problem: Problem) -> None:
-        """Refuse an odd population, too."""
+        """Also refuse an odd population."""
         super().check(problem)
         if problem.population % 2:
             fix = f"the samples of algorithm={self.name} come in pairs, one on each side of the centre"
@@ -175,10 +175,10 @@ class MirroredStrategy(EvolutionStrategy):
 
 
 class StrategySearch(Search):
-    """An optimiser at work on the weights of a team; a generation is one update.
+    """The optimisation of a team's weights; a generation is one update.
 
-    Candidates are its centres, each after an update and with the mean fitness of the samples that led there: many
-    episodes, so no lucky one decides, and none of them costs more. At most `RACERS`, the latest among them.
+    Candidates are the centres after updates, each with the mean fitness of the samples of its update: a mean over many
+    episodes, not one lucky episode, at no extra cost. At most `RACERS` are kept, always including the latest.
     """
 
     def __init__(self, problem: Problem, strategy: EvolutionStrategy) -> None:
@@ -192,10 +192,10 @@ class StrategySearch(Search):
         self._moments = [Moments(*np.zeros((3, pins))) for pins, _, _ in shapes]
         self._waiting = False
         self._generation = 0
-        self._centres: list[tuple[float, int, Vectors]] = []  # fitness, generation, folded; the best first
+        self._centres: list[tuple[float, int, Vectors]] = []  # fitness, generation, folded vector; the best first
 
     def ask(self) -> tuple[list[Team], int]:
-        """A sample of each team around the centre."""
+        """The teams of the samples around the centre."""
         if self._waiting:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
         self._waiting = True
@@ -226,7 +226,7 @@ class StrategySearch(Search):
             del self._centres[-2 if worst else -1]
 
     def candidates(self) -> list[Candidate]:
-        """Its centres, see above."""
+        """The best centres, see the class."""
         if not self._centres:
             return []
         fitness, generations, centres = zip(*self._centres, strict=True)
@@ -235,10 +235,10 @@ class StrategySearch(Search):
         return [Candidate(*entry) for entry in zip(teams, fitness, generations, strict=True)]
 
     def state(self) -> State:
-        """Optimiser, statistics of the inputs, and centres.
+        """The optimiser, the statistics of the inputs, and the centres.
 
         Raises:
-            RuntimeError: the teams that were asked for were not told their fitness.
+            RuntimeError: there is no generation yet, or the last teams have no fitness.
         """
         if self._waiting or not self._generation:
             raise RuntimeError("state: expected ask() and tell(results) before it")
@@ -250,10 +250,10 @@ class StrategySearch(Search):
         return {"generation": self._generation, "optimiser": plain, "centres": entries}, columns
 
     def restore(self, state: State) -> None:
-        """Bring a search that has just begun into this state.
+        """Bring a new search into this state.
 
         Raises:
-            ArithmeticError, LookupError, TypeError, ValueError: it is none, or does not fit.
+            ArithmeticError, LookupError, TypeError, ValueError: the state is invalid or does not fit.
         """
         plain, columns = state
         self._generation = int(plain["generation"])

@@ -1,12 +1,12 @@
-"""ExNEAT and NEAT: subpopulations of NEAT genomes that evolve on their own under a fitness that they share.
+"""ExNEAT and NEAT: subpopulations of NEAT genomes that evolve independently under a shared fitness.
 
 Sources: Zhang, "ExNEAT - Separable network through coevolution of partially-dependent sub-modules", MEng thesis,
 Imperial College London, 2025, section 3.1.2; Stanley and Miikkulainen, "Evolving neural networks through augmenting
-topologies", Evolutionary Computation 10(2), 2002. NEAT is the case of one module with one subpopulation.
+topologies", Evolutionary Computation 10(2), 2002. NEAT is the case of one module and one subpopulation.
 
-A generation: `ask` reproduces every subpopulation by the last fitness and pairs their genomes into teams; `tell`
-gives every genome of a team the team's mean over its episodes. Under ``judging=mean`` these are all episodes that the
-team ever had, and a second turn of `ask` and `tell` gives the best fifth some more.
+In a generation, `ask` reproduces every subpopulation based on the last fitness and pairs their genomes into teams;
+`tell` gives every genome of a team the team's mean over its episodes. With ``judging=mean``, these are all episodes in
+which the team was ever evaluated, and a second turn of `ask` and `tell` gives the best fifth further episodes.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from exneat_cli.tasks import Task
 from exneat_cli.wiring import Geometry, Moments, Plan, Wiring, plan_body, refuse_modules, with_sensed
 
 JUDGINGS = ("last", "mean")
-"""Whether a team competes by its mean over the episodes of this generation, or over all that it ever had."""
+"""Whether a team competes by its mean over the episodes of this generation, or over all of its episodes so far."""
 SECOND_LOOKS = 1 / 6
-"""Share of a generation's cost that goes into more episodes for its best teams under ``judging=mean``: for the best
-fifth of those that are left. Re-sampling where it matters, after Flageat and Cully, "Uncertain quality-diversity",
-IEEE Transactions on Evolutionary Computation, 2023."""
+"""Share of a generation's budget that goes into further episodes for its best teams with ``judging=mean``: for the best
+fifth of the remaining teams. Re-sampling of the teams that matter follows Flageat and Cully, "Uncertain
+quality-diversity", IEEE Transactions on Evolutionary Computation, 2023."""
 SURVIVORS = 0.1
-"""Least share of the population that survives under ``judging=mean``: only who survives is judged by more episodes."""
+"""Minimum share of the population that survives with ``judging=mean``: only survivors are judged by more episodes."""
 
 
 class Record(NamedTuple):
-    """What a team got: mean fitness over its episodes, how many these are, and whether one of them failed."""
+    """The results of a team: mean fitness over its episodes, their number, and whether one of them failed."""
 
     mean: float = 0.0
     episodes: int = 0
     failed: bool = False
 
     def after(self, mean: float, episodes: int, *, failed: bool) -> Record:
-        """The record with so many episodes more, of this mean."""
+        """The record after `episodes` further episodes with this mean."""
         if not self.episodes:
             return Record(mean, episodes, failed)
         total = self.episodes + episodes
@@ -56,10 +56,10 @@ class Record(NamedTuple):
 
 
 class Coevolution(Search):
-    """One NEAT subpopulation for each that the plan names, paired into teams; begins at random or goes on from a state.
+    """The plan's NEAT subpopulations, paired into teams; starts at random or continues from a state.
 
     Raises:
-        ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the state is none, or does not fit.
+        ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the state is invalid or does not fit.
     """
 
     def __init__(self, problem: Problem, state: State | None = None) -> None:
@@ -68,9 +68,9 @@ class Coevolution(Search):
         self._by_mean = problem.judging == "mean"
         self._looks = int(problem.population * SECOND_LOOKS) if self._by_mean else 0
         self._teams: list[Team] = []
-        self._asked: list[int] = []  # the teams that wait for a fitness, by their index
+        self._asked: list[int] = []  # indices of the teams that wait for a fitness
         self._records: dict[tuple[int, ...], Record] = {}  # of the teams, by their ids
-        self._fitness: list[float] = []  # of the teams, as they compete; empty until the generation is over
+        self._fitness: list[float] = []  # by which the teams compete; empty until the generation is over
         self._generation = self._extinctions = 0
         self._hall_of_fame: list[Candidate] = []
         shapes, safe = problem.plan.subpopulation_shapes, problem.evolution.safe_mutation
@@ -90,7 +90,7 @@ class Coevolution(Search):
             self._restore(plain, arrays)
 
     def ask(self) -> tuple[list[Team], int]:
-        """The teams of the next generation, or those of this one that get a second look."""
+        """The teams of the next generation, or those of this one that get further episodes."""
         if self._asked:
             raise RuntimeError("ask: the last teams have no fitness yet; expected tell(results) before it")
         if self._teams and not self._fitness:
@@ -118,7 +118,7 @@ class Coevolution(Search):
         self._records = {team.ids: known.get(team.ids, Record()) for team in self._teams}
 
     def tell(self, results: Results) -> bool:
-        """Take what the teams got; the generation is over once the best had their second look."""
+        """Take the results of the teams; the generation is over once the best have had their further episodes."""
         if not self._asked:
             raise RuntimeError("tell: no teams are waiting for a fitness; expected ask() before it")
         means, episodes = results.means(len(self._asked)), results.fitness.shape[1]
@@ -136,12 +136,12 @@ class Coevolution(Search):
         return is_over
 
     def _judged(self) -> list[float]:
-        """Fitness of the teams, as they compete."""
+        """The fitness by which the teams compete."""
         records = [self._records[team.ids] for team in self._teams]
         return failed_last([each.mean for each in records], [k for k, each in enumerate(records) if not each.failed])
 
     def _remember(self) -> None:
-        """Offer the teams that did not fail for the championship."""
+        """Offer the teams that did not fail as candidates."""
         offered = [
             Candidate(team, self._records[team.ids].mean, self._generation)
             for team in self._teams
@@ -158,13 +158,13 @@ class Coevolution(Search):
         return Team(tuple(s.in_arrays(key) for s, key in zip(self._subpopulations, ids, strict=True)), ids)
 
     def candidates(self) -> list[Candidate]:
-        """The teams remembered, see `with_candidate` and `with_racers`."""
+        """The hall of fame, see `with_candidate` and `with_racers`."""
         return list(self._hall_of_fame)
 
     def columns(self) -> dict[str, int | float]:
-        """Species, summed over subpopulations, and how many of these were created anew for this generation.
+        """Species, summed over subpopulations, and how many subpopulations were created anew for this generation.
 
-        Under ``judging=mean`` also the best fitness as it is judged, and the mean mutation power if that is adaptive.
+        With ``judging=mean``, also the best judged fitness; with adaptive mutation, also the mean mutation power.
         """
         species = sum(subpopulation.species_count for subpopulation in self._subpopulations)
         columns: dict[str, int | float] = {"species": species, "extinctions": self._extinctions}
@@ -177,7 +177,7 @@ class Coevolution(Search):
         """Subpopulations, teams and hall of fame.
 
         Raises:
-            RuntimeError: the teams that were asked for were not told their fitness.
+            RuntimeError: there is no generation yet, or the last teams have no fitness.
         """
         if not self._fitness:
             raise RuntimeError("state: expected ask() and tell(results) before it")
@@ -198,7 +198,7 @@ class Coevolution(Search):
         return plain, arrays
 
     def _restore(self, plain: Mapping[str, Any], arrays: Columns) -> None:
-        """Bring all but the subpopulations into the state that `state` gave."""
+        """Restore everything but the subpopulations from a state."""
         self._pairing_rng = generator_in(plain["pairing"])
         self._teams = [self._team(tuple(int(key) for key in ids)) for ids in plain["teams"]]
         for index, subpopulation in enumerate(self._subpopulations):
@@ -225,7 +225,7 @@ class Coevolution(Search):
 
 @dataclass(frozen=True)
 class ExNEAT(Algorithm):
-    """Settings of ExNEAT beside those of its genomes, see `EvolutionSettings`."""
+    """Settings of ExNEAT, apart from those of its genomes; see `EvolutionSettings`."""
 
     name: str = "exneat"
 
@@ -233,15 +233,15 @@ class ExNEAT(Algorithm):
         check_choice("algorithm.name", self.name, [type(self).name])
 
     def wants_moments(self, evolution: EvolutionSettings) -> bool:
-        """Whether mutations are to be safe."""
+        """Whether mutations are safe, see `EvolutionSettings`."""
         return evolution.safe_mutation
 
     def start(self, problem: Problem) -> Search:
-        """Begin with random genomes."""
+        """Start with random genomes."""
         return Coevolution(problem)
 
     def restored(self, problem: Problem, state: State) -> Search:
-        """The co-evolution that `state` was taken of."""
+        """The co-evolution in `state`."""
         return Coevolution(problem, state)
 
 
@@ -253,13 +253,13 @@ class NEAT(ExNEAT):
     modular = False
 
     def plan(self, task: Task, geometry: Geometry, linkage: str, wiring: Wiring, evolution: EvolutionSettings) -> Plan:
-        """One module, whatever the body."""
+        """One module for the whole body."""
         refuse_modules(self.name, geometry, linkage, wiring)
         return plan_body(task, hidden=evolution.neat_hidden)
 
 
 def failed_last(fitness: Sequence[float], sound: Sequence[int]) -> list[float]:
-    """The same values, but for teams not in `sound`, which rank behind those, also behind those below the floor."""
+    """The same values, except that teams not in `sound` rank behind the others, even those below the failure floor."""
     if not sound:
         return list(fitness)
     behind = math.nextafter(min(fitness[k] for k in sound), -math.inf)
@@ -273,9 +273,9 @@ def best_first(fitness: Sequence[float]) -> list[int]:
 
 
 def separate_ties(fitness: Sequence[float]) -> list[float]:
-    """The same values, pushed down by the least amounts that make them all differ.
+    """The same values, lowered by the smallest amounts that make them all different.
 
-    Of equal values the one with the lower index stays the higher. Without this, neat-python breaks ties
+    Of equal values, the one with the lower index stays higher. Without this, neat-python breaks ties
     by genome id, and two subpopulations would keep the genomes of different teams.
     """
     separated = list(fitness)

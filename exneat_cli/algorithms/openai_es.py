@@ -23,7 +23,7 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
 
 
 class RankedGradient(MirroredOptimiser):
-    """The update of `OpenAIES`; arguments as there."""
+    """The update of `OpenAIES`; takes the same arguments."""
 
     def __init__(
         self, start: Vectors, population: int, seed: SeedSequence, step_size: float, noise: float, weight_decay: float
@@ -34,8 +34,8 @@ class RankedGradient(MirroredOptimiser):
         self._first, self._second = np.zeros((2, len(start)))  # Adam's moments of the gradient
 
     def tell(self, fitness: Vectors) -> None:
-        """Climb the gradient of the ranks, less the decay of the weights."""
-        # 1. Gradient: directions weighed by ranks; summed direction by direction, in this order on every machine.
+        """Follow the gradient of the ranks, with weight decay."""
+        # 1. Gradient: directions weighted by ranks, summed direction by direction, in the same order on every machine.
         ranks = centred_ranks(fitness)
         gain = (ranks[: self._count] - ranks[self._count :])[:, np.newaxis]
         gradient = (gain * self._directions).sum(axis=0) / (2 * self._count * self._noise)
@@ -49,12 +49,12 @@ class RankedGradient(MirroredOptimiser):
         self.centre = self.centre + self._step_size * first / (np.sqrt(second) + EPSILON)
 
     def state(self) -> State:
-        """The centre, Adam's moments, and the random numbers to come."""
+        """The centre, Adam's moments, and the state of the random numbers."""
         columns = {"centre": self.centre, "first": self._first, "second": self._second}
         return {"rng": dict(self._rng.bit_generator.state), "updates": self._updates}, columns
 
     def restore(self, state: State) -> None:
-        """Go on from there."""
+        """Continue from a state."""
         plain, columns = state
         self._rng, self._updates = generator_in(plain["rng"]), int(plain["updates"])
         names = ("centre", "first", "second")
@@ -64,7 +64,7 @@ class RankedGradient(MirroredOptimiser):
 
 
 def centred_ranks(fitness: Vectors) -> Vectors:
-    """Ranks from -0.5 for the lowest to 0.5 for the highest; equals get the mean of theirs."""
+    """Ranks from -0.5 for the lowest to 0.5 for the highest; equal values get the mean of their ranks."""
     _, place, counts = np.unique(fitness, return_inverse=True, return_counts=True)
     ranks = np.cumsum(counts) - 0.5 * (counts + 1)
     return np.asarray(ranks[place] / (len(fitness) - 1) - 0.5)
@@ -75,9 +75,9 @@ class OpenAIES(MirroredStrategy):
     """Settings of OpenAI's evolution strategy; the defaults are the paper's for MuJoCo.
 
     Attributes:
-        step_size: Adam's, at least 1e-6.
-        noise: sd of what a sample adds to each weight, at least 1e-6.
-        weight_decay: share of each weight that is taken off the gradient, at least 0.
+        step_size: Adam's step size, at least 1e-6.
+        noise: sd of the difference between a sample's weights and the centre's, at least 1e-6.
+        weight_decay: share of each weight that is subtracted from the gradient, at least 0.
 
     Raises:
         ConfigError: a value is out of range.
@@ -95,5 +95,5 @@ class OpenAIES(MirroredStrategy):
         check_real("algorithm.weight_decay", self.weight_decay, 0.0)
 
     def optimiser(self, start: Vectors, population: int, seed: SeedSequence) -> Optimiser:
-        """Climb from there."""
+        """A gradient ascent that starts at `start`."""
         return RankedGradient(start, population, seed, self.step_size, self.noise, self.weight_decay)

@@ -1,4 +1,4 @@
-"""Which genomes of several subpopulations make a team: those at the same place of the subpopulations' orders."""
+"""Which genomes form a team: those at the same position in the orders of their subpopulations."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 from numpy.random import Generator
 
 PAIRINGS = ("rank", "parents", "index")
-"""``rank`` lets survivors meet in the order of their teams' fitness, so that the best team stays together, and
-offspring at random; with ``parents`` they meet offspring of genomes that were a team, as far as there are any;
-``index`` pairs in neat-python's own order."""
+"""``rank`` pairs survivors in the order of their teams' fitness, so that the best team stays together, and offspring at
+random; ``parents`` pairs offspring whose first parents formed a team, as far as possible; ``index`` pairs in
+neat-python's own order."""
 
 
 def by_rank(orders: Sequence[Sequence[int]], ranked: Sequence[tuple[int, ...]], rng: Generator) -> list[list[int]]:
-    """Orders of genomes' ids in which survivors come first, in the order of the last teams, then offspring shuffled.
+    """Orders of genomes' ids: survivors first, in the order of the last teams, then offspring in random order.
 
     Args:
-        orders: of each subpopulation, all ids.
+        orders: all ids of each subpopulation.
         ranked: ids of the last generation's teams, the best first.
-        rng: of the shuffles.
+        rng: generator of the random order.
     """
     changed = []
     for index, ids in enumerate(orders):
@@ -32,14 +32,14 @@ def by_rank(orders: Sequence[Sequence[int]], ranked: Sequence[tuple[int, ...]], 
 def with_siblings(
     orders: Sequence[Sequence[int]], ranked: Sequence[tuple[int, ...]], first_parents: Sequence[Mapping[int, int]]
 ) -> list[list[int]]:
-    """The same orders, but for offspring of later subpopulations, which move to where the first one has siblings.
+    """The same orders, except that offspring of later subpopulations move to the positions of siblings in the first.
 
-    Siblings are genomes whose first parents were one team; survivors stay where they are.
+    Siblings are genomes whose first parents formed a team; survivors keep their positions.
 
     Args:
         orders: from `by_rank`.
-        ranked: as there.
-        first_parents: of each subpopulation, the first parent of each of the offspring, by ids.
+        ranked: ids of the last generation's teams, the best first.
+        first_parents: for each subpopulation, offspring's ids -> ids of their first parents.
     """
     teams = [{ids[index]: k for k, ids in enumerate(ranked)} for index in range(len(orders))]
     lines = [

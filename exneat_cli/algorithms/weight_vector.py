@@ -1,8 +1,9 @@
-"""All weights and biases of a team as one vector, and teams from vectors, with normalised inputs worked in.
+"""All weights and biases of a team as one vector, and teams made from vectors, with input normalisation folded in.
 
-Input normalisation: every sensor pin is taken as (x - mean) / sd, with the statistics of all that was sensed at it so
-far, pooled over the modules that share a genome (Mania et al., 2018, section 3.2). A network with biases can hold it in
-its own numbers: w / sd for the weight, and the bias less the sum of w mean / sd. So teams are ordinary ones.
+Input normalisation: the value x of every sensor pin becomes (x - mean) / sd, with the statistics of all values that the
+pin has sensed so far, pooled over the modules that share a genome (Mania et al., 2018, section 3.2). A network with
+biases can include this in its parameters: each weight w becomes w / sd, and the sum of w mean / sd is subtracted from
+the bias. The teams are therefore ordinary ones.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from exneat_cli.seeding import stream
 from exneat_cli.wiring import Moments
 
 LEAST_SD = 0.01
-"""In a pin's unit. One that hardly ever varies would be blown up when it does."""
+"""Minimum sd, in a pin's unit: otherwise rare changes of an almost constant input would be amplified too much."""
 
 Vectors = NDArray[np.float64]
 
 
 def has_biases(evolution: EvolutionSettings) -> bool:
-    """Whether evolution would ever give a node a bias."""
+    """Whether evolution could ever give a node a bias."""
     return evolution.bias_init_stdev > 0.0 or min(evolution.bias_mutate_rate, evolution.bias_mutate_power) > 0.0
 
 
 class Layout:
-    """Where a problem's vector has which weight: for each subpopulation those of connections, then biases if any.
+    """The layout of a problem's vector: for each subpopulation, the weights of connections, then any biases.
 
     Attributes:
         with_biases: whether nodes have biases.
-        size: of the vector.
-        folded_size: of one that is folded, in which every node has a bias.
+        size: length of the vector.
+        folded_size: length of a folded vector, in which every node has a bias.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -53,9 +54,9 @@ class Layout:
         self.size, self.folded_size = weights + (biases if self.with_biases else 0), weights + biases
 
     def folded(self, vectors: Vectors, sensed: Sequence[Moments]) -> Vectors:
-        """Vectors, (T, size), as networks hold them, (T, folded_size), with normalised inputs folded in.
+        """Vectors, (T, size), as weights and biases of networks, (T, folded_size), with input normalisation folded in.
 
-        `sensed` are the moments of each subpopulation's pins; pins that sensed nothing are taken as they are.
+        `sensed` are the moments of each subpopulation's pins; pins with fewer than two values are not normalised.
         """
         columns, first = [], 0
         for genome, moments in zip(self._genomes, sensed, strict=True):
@@ -91,7 +92,7 @@ class Layout:
 
 
 def _of_connections(sources: NDArray[np.int64], moments: Moments) -> tuple[Vectors, Vectors]:
-    """Mean and sd of what each connection reads: 0 and 1 where that is a node, or a pin that sensed nothing yet."""
+    """Mean and sd of the values that each connection reads; 0 and 1 for nodes and pins with fewer than two values."""
     counts, means, squares = moments
     known = counts >= 2.0
     sd = np.sqrt(np.divide(squares, counts, out=np.ones_like(counts), where=known))

@@ -1,4 +1,4 @@
-"""Team and plan become flat arrays for one compiled kernel; also the brains that follow a fixed rule."""
+"""Brains: teams and plans as flat arrays for one compiled kernel, and brains that follow a fixed rule."""
 
 from exneat_cli.brains.assembly import assemble, places_in_memory
 from exneat_cli.brains.brain import Brains

@@ -1,8 +1,9 @@
-"""From teams and a wiring plan to brains, a whole generation in one compiled call.
+"""Assembles brains from teams and a wiring plan, a whole generation in one compiled call.
 
 A genome is expressed as neat-python's own network classes would build it. Within a network, local index k below the
-number of pins is a pin. The others are value slots of nodes: outputs first, then the initial hidden nodes if other
-modules read them, then whatever else is evaluated, then one that stays 0 and stands for all other nodes.
+number of pins is a pin. The others are the slots of node values: outputs first, then the initial hidden nodes if other
+modules read them, then all other nodes that are evaluated, then one slot that stays 0 and stands for the remaining
+nodes.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from exneat_cli.compiling import compiled
 from exneat_cli.wiring import Plan
 
 NETWORK = np.dtype([("inputs", np.int64), ("read_outside", np.int64)])
-"""Of a subpopulation: how many pins a module has, and how many of its first nodes are read from outside: the outputs
-and, where they are linked, the initial hidden nodes."""
+"""For each subpopulation: the number of pins of a module, and how many of its first nodes are read from outside (the
+outputs and, if they are linked, the initial hidden nodes)."""
 PIN = np.dtype([("index", np.int64), ("module", np.int64), ("delayed", np.bool_)], align=True)
 """As in `exneat_cli.wiring.Pin`."""
 ACTUATOR = np.dtype([("module", np.int64), ("output", np.int64)])
-"""The module that sets it, -1 for none, and which of its outputs does."""
+"""The module that sets the actuator, -1 for none, and the number of its output."""
 Place = tuple[int, int]
 """A module, and the key of a node in its genome, or -1 - k for its pin k."""
 
 
 @functools.lru_cache(maxsize=16)
 def wiring_tables(plan: Plan) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """A plan for compiled code: (S,) networks, (M,) the subpopulation of each module, (P,) all pins, (A,) actuators."""
+    """A plan for compiled code: (S,) networks, (M,) subpopulations of modules, (P,) all pins, (A,) actuators."""
     networks = np.zeros(len(plan.subpopulation_shapes), NETWORK)
     actuators = np.array([(-1, 0)] * plan.action_size, ACTUATOR)
     for m, module in enumerate(plan.modules):
@@ -47,12 +48,13 @@ def wiring_tables(plan: Plan) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any],
 
 
 def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward: bool) -> Brains:
-    """Compile each team into the brain that `plan` wires.
+    """Compile each team into a brain wired according to `plan`.
 
     Args:
-        plan: who senses and drives what; must have at least one module.
-        teams: at least one, of a genome per subpopulation; sharing modules each get a copy of its network.
-        feed_forward: whether the modules are feed-forward networks, else recurrent ones.
+        plan: the wiring, with at least one module.
+        teams: at least one, each with a genome per subpopulation; modules that share one each get a copy of its
+            network.
+        feed_forward: whether the modules are feed-forward networks; otherwise they are recurrent.
 
     Raises:
         ValueError: a connection of a genome has an end that does not exist, or the number of genomes is wrong.
@@ -67,7 +69,7 @@ def assemble(plan: Plan, teams: Sequence[Sequence[ArrayGenome]], *, feed_forward
     connections = end_to_end((genome.connections for genome in genomes), CONNECTION)
     first_node = np.cumsum([0] + [len(genome.nodes) for genome in genomes])
     first_connection = np.cumsum([0] + [len(genome.connections) for genome in genomes])
-    # Room for every gene of every module; what is left over is cut off at the end.
+    # Space for every gene of every module; unused space is cut off at the end.
     room_for_nodes, room_for_edges = (
         int(np.diff(first).reshape(-1, members)[:, subpopulation].sum()) for first in (first_node, first_connection)
     )
@@ -94,9 +96,9 @@ def _room(plan: Plan, teams: int, nodes: int, edges: int, links: int) -> Brains:
 
 
 def places_in_memory(plan: Plan, genomes: Sequence[ArrayGenome], *, feed_forward: bool) -> dict[Place, int]:
-    """The slot of each value, as `assemble` lays out a team; left out are nodes that are never evaluated.
+    """The slot of each value in a team's brain from `assemble`, except for nodes that are never evaluated.
 
-    A delayed pin of a recurrent brain has the slot that it reads: what it read is there before the step.
+    A delayed pin of a recurrent brain has the slot that it reads, which still holds that value before the step.
     """
     wiring = wiring_tables(plan)
     networks, subpopulation, pins, _ = wiring
@@ -125,11 +127,12 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
     """
     networks, subpopulation, pins, _ = wiring
     members, modules = networks.size, subpopulation.size
-    # Of the networks, gene by gene: rows in the order of evaluation, local indices of nodes and of what is read.
+    # For the genes of all networks: rows in the order of evaluation, local indices of nodes and of connections'
+    # sources.
     order, slot_of = np.zeros(nodes.size, np.int64), np.zeros(nodes.size, np.int64)
     source_of = np.zeros(connections.size, np.int64)
     evaluated, slots = np.zeros(members, np.int64), np.zeros(members, np.int64)
-    # Of one team: the first slot of each module, and the slot that each pin reads.
+    # For one team: the first slot of each module, and the slot that each pin reads.
     base, pin_slot = np.zeros(modules + 1, np.int64), np.zeros(pins.size, np.int64)
     for t in range(brains.size.size):
         # 1. One network per genome.
@@ -139,7 +142,7 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
             evaluated[s], slots[s] = _express(
                 networks[s], nodes[a:b], connections[c:d], feed_forward, order[a:b], slot_of[a:b], source_of[c:d]
             )
-        # 2. One stretch of slots per module.
+        # 2. Consecutive slots for each module.
         _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains)
         # 3. Nodes and edges; modules that share a genome each get a copy.
         brains.first_node[t + 1] = brains.first_node[t]
@@ -155,17 +158,17 @@ def _assemble(wiring, nodes, first_node, connections, first_connection, feed_for
 
 @compiled
 def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type: ignore[no-untyped-def]
-    """Decide where the values of team `t` are kept, and write its links and actuators.
+    """Assign slots to the values of team `t`, and write its links and actuators.
 
-    Network s has `slots[s]` of them. Overwritten are `base`, (M + 1,), by the first slot of each module, which lie
-    behind what is sensed, and `pin_slot`, (P,), by the slot that each pin reads.
+    Network s has `slots[s]` values. Overwrites `base`, (M + 1,), with the first slot of each module, behind the sensed
+    values, and `pin_slot`, (P,), with the slot that each pin reads.
     """
     _, subpopulation, pins, actuators = wiring
     base[0] = brains.observation_size
     for m in range(subpopulation.size):
         base[m + 1] = base[m] + slots[subpopulation[m]]
-    # In a feed-forward brain a delayed pin reads a copy that is made at the step's start; in a recurrent one every
-    # slot still holds the previous step's value anyway. Copies lie behind the modules.
+    # In a feed-forward brain a delayed pin reads a copy that is made at the start of the step; in a recurrent one every
+    # slot still holds the previous step's value. Copies lie behind the modules.
     link, end = brains.first_link[t], base[-1]
     for p in range(pin_slot.size):
         pin_slot[p] = pins[p].index
@@ -177,7 +180,7 @@ def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type
             link += 1
             end += 1
     brains.first_link[t + 1] = link
-    # The last slot stays 0, for actuators that nobody drives.
+    # The last slot stays 0, for actuators that no module drives.
     brains.size[t] = end + 1
     for k in range(actuators.size):
         module = actuators[k].module
@@ -188,8 +191,8 @@ def _give_slots(wiring, t, slots, feed_forward, base, pin_slot, brains):  # type
 def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, brains):  # type: ignore[no-untyped-def]
     """Add the nodes and edges of one module to those of team `t`.
 
-    The tables and local indices are those of its genome, `rows` those of the nodes to evaluate, in order, `pins` the
-    slots that its pins read, and `base` is its first slot.
+    Tables and local indices are those of its genome, `rows` are the nodes to evaluate, in order, `pins` are the slots
+    that its pins read, and `base` is its first slot.
     """
     node = brains.first_node[t + 1]
     edge = brains.edge_start[node]
@@ -214,13 +217,13 @@ def _write_module(t, nodes, connections, rows, slot_of, source_of, pins, base, b
 
 @compiled
 def _express(network, nodes, connections, feed_forward, order, slot_of, source_of):  # type: ignore[no-untyped-def]
-    """Make the network of one genome; returns how many nodes it evaluates and how many value slots it has.
+    """Make the network of one genome; returns the numbers of nodes that it evaluates and of its value slots.
 
-    Overwritten are `order` by the rows of the nodes to evaluate, in order, and by local indices `slot_of`, of each
-    node's value, and `source_of`, of what each connection reads.
+    Overwrites `order` with the rows of the nodes to evaluate, in order, `slot_of` with the local index of each node's
+    value, and `source_of` with that of the value that each connection reads.
     """
     inputs, read_outside = network.inputs, network.read_outside
-    # First the row of the node that each connection reads, or -1 - k for pin k.
+    # First, the row of the node that each connection reads, or -1 - k for pin k.
     for i in range(connections.size):
         source = connections[i].source
         source_of[i] = source if source < 0 else node_row(nodes, source)
@@ -245,11 +248,11 @@ def _express(network, nodes, connections, feed_forward, order, slot_of, source_o
 
 @compiled
 def _order(nodes, connections, source_of, read_outside, feed_forward, order):  # type: ignore[no-untyped-def]
-    """Write the rows of the nodes to evaluate into the head of `order`; returns how many they are.
+    """Write the rows of the nodes to evaluate to the start of `order`; returns their number.
 
-    Wanted is what other modules or actuators read, if it exists, and whatever leads there. Of a recurrent network, all
-    that are wanted and have an input. Of a feed-forward one, all that are wanted, after everything that they read;
-    those on or behind a cycle are left out.
+    Wanted are the existing nodes that other modules or actuators read, and all nodes that lead to them. In a recurrent
+    network, the wanted nodes that have an input are evaluated; in a feed-forward one all wanted nodes, each after those
+    that it reads, except for nodes on or behind a cycle.
     """
     wanted = nodes["key"] < read_outside
     mark_sources(nodes, connections, wanted, True)

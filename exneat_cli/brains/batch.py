@@ -1,4 +1,4 @@
-"""The kernel of `exneat_cli.brains.brain` for many brains side by side, in single precision, by Warp."""
+"""The kernel of `exneat_cli.brains.brain` for many brains in parallel, in single precision, for Warp."""
 
 import numpy as np
 import warp as wp
@@ -15,9 +15,9 @@ _EDGE_WEIGHT, _BIAS, _RESPONSE, _ACTIVATION, _LINK_SLOT, _LINK_SOURCE, _OUTPUT_S
 
 
 def packed(brains: Brains) -> NDArray[np.int32]:
-    """All of `brains` as one row of words, so that one copy brings them: where each of `FIELDS` begins, then those.
+    """All of `brains` as one row of words, to be copied at once: where each of `FIELDS` begins, then the fields.
 
-    Fractions are in single precision, by their bits.
+    Floating-point numbers become the bits of their single-precision values.
     """
     columns = [np.ravel(getattr(brains, name)) for name in FIELDS]
     begins = len(FIELDS) + np.cumsum([0, *map(len, columns)])[:-1]
@@ -46,7 +46,7 @@ def activate(
 ):
     """One step of each world's brain, see `exneat_cli.brains.brain.activate`.
 
-    Each slot has a row of `programs`, as `packed` made it; a world's brain is number `brains` of `slots`, -1 for none.
+    Each slot has a row of `programs`, from `packed`; world w runs brain `brains[w]` (-1: none) of slot `slots[w]`.
     """
     w = wp.tid()
     s, b = slots[w], brains[w]

@@ -1,8 +1,8 @@
 """Whole brains as flat arrays, and the compiled kernel that runs them.
 
-All values live in one vector: what is sensed first, then the nodes of every module, then a copy of what
-links read (feed-forward brains), then a slot that stays 0. Semantics are those of neat-python's networks,
-weights and order of summation included.
+All values are kept in one vector: the sensed values, then the nodes of every module, then copies of the values that
+links read (in feed-forward brains), then a slot that stays 0. Results are those of neat-python's networks, including
+the order of summation.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from exneat_cli.compiling import compiled_lean
 
 
 class Brains(NamedTuple):
-    """B compiled teams for one task, laid end to end, so that one compiled call can run them all.
+    """B compiled teams for one task, end to end, so that one compiled call can run them all.
 
-    N nodes in the order of evaluation, E edges and L links in all; A actuators.
+    They have N nodes, in the order of evaluation, E edges and L links in total, and A actuators each.
 
     Attributes:
-        observation_size: entries of what each of them senses, `Task.sensed_size`.
+        observation_size: number of sensed values, `Task.sensed_size`.
         size: (B,) length of each value vector; its last entry stays 0.
-        recurrent: (B,) all nodes advance together from the previous step's values, else one after another.
+        recurrent: (B,) whether all nodes advance together from the previous step's values, rather than one after
+            another.
         first_node: (B + 1,) the nodes of brain b are first_node[b] to first_node[b + 1].
         first_link: (B + 1,) its links, likewise.
-        node_slot: (N,) where each node's value is kept.
+        node_slot: (N,) slot of each node's value.
         edge_start: (N + 1,) the edges of node n are edge_start[n] to edge_start[n + 1].
         edge_source: (E,) slot that each edge reads.
         edge_weight: (E,) its weight.
         bias, response: (N,) a node's value is act(bias + response * sum).
         activation: (N,) indices into `exneat_cli.algorithms.ACTIVATIONS`.
-        link_slot, link_source: (L,) at each step's start the source's old value is copied to the slot.
+        link_slot, link_source: (L,) at the start of each step, the source's old value is copied to the slot.
         output_slot: (B, A) slot that sets each actuator.
     """
 
@@ -55,7 +56,7 @@ class Brains(NamedTuple):
     output_slot: NDArray[np.int64]
 
     def part(self, first: int, last: int) -> Brains:
-        """Those from `first` to before `last`, counted from 0 again; their arrays are views where they can be."""
+        """The brains from `first` to before `last`, renumbered from 0; arrays are views where possible."""
         brains, nodes = slice(first, last), slice(int(self.first_node[first]), int(self.first_node[last]))
         links = slice(int(self.first_link[first]), int(self.first_link[last]))
         edges = slice(int(self.edge_start[nodes.start]), int(self.edge_start[nodes.stop]))
@@ -72,10 +73,10 @@ class Brains(NamedTuple):
 
 
 def lay_out(brains: Sequence[Brains]) -> Brains:
-    """All of `brains` end to end.
+    """All of `brains`, end to end.
 
     Raises:
-        ValueError: there are none, or they were wired for different sizes of observation or action.
+        ValueError: there are none, or they have different sizes of observation or action.
     """
     sizes = {(each.observation_size, each.output_slot.shape[1]) for each in brains}
     if len(sizes) != 1:
@@ -84,7 +85,7 @@ def lay_out(brains: Sequence[Brains]) -> Brains:
 
     def joined(field: str) -> NDArray[Any]:
         columns = [getattr(each, field) for each in brains]
-        if field in ("first_node", "first_link", "edge_start"):  # positions, which are counted through
+        if field in ("first_node", "first_link", "edge_start"):  # positions, which continue from one to the next
             return np.cumsum(np.concatenate([[0], *(np.diff(column) for column in columns)]))
         return np.concatenate(columns)
 
@@ -92,7 +93,7 @@ def lay_out(brains: Sequence[Brains]) -> Brains:
 
 
 def memory_size(brains: Brains) -> int:
-    """Room for the value vector of any of `brains` and a scratch entry for each of its nodes."""
+    """Size of the memory for any of `brains`: its value vector and a scratch entry for each of its nodes."""
     return int(np.max(brains.size + np.diff(brains.first_node)))
 
 
@@ -101,15 +102,15 @@ def activate(brains: Brains, b: int, memory: NDArray[np.float64], action: NDArra
     """One step of brain `b`: advance `memory` and write `action`.
 
     Args:
-        brains: see there.
-        b: which of them.
-        memory: (`memory_size`,), all 0 when an episode starts; its head is what is sensed at this step.
+        brains: the compiled teams.
+        b: index of the brain.
+        memory: (`memory_size`,), all 0 when an episode starts; it begins with the values sensed at this step.
         action: (A,), overwritten.
     """
-    # 1. Keep what links read, before it is overwritten.
+    # 1. Copy the values that links read, before they are overwritten.
     for i in range(brains.first_link[b], brains.first_link[b + 1]):
         memory[brains.link_slot[i]] = memory[brains.link_source[i]]
-    # 2. Evaluate; new values of a recurrent brain wait behind the value vector until all are there.
+    # 2. Evaluate; new values of a recurrent brain are kept behind the value vector until all are known.
     first, last = brains.first_node[b], brains.first_node[b + 1]
     recurrent, scratch = brains.recurrent[b], brains.size[b] - first
     for node in range(first, last):
@@ -128,7 +129,7 @@ def activate(brains: Brains, b: int, memory: NDArray[np.float64], action: NDArra
 
 @compiled_lean
 def _activation(code, value):  # type: ignore[no-untyped-def]
-    """neat-python's functions, with its scaling and limits; `code` indexes `exneat_cli.algorithms.ACTIVATIONS`."""
+    """neat-python's functions, with its scaling and clipping; `code` indexes `exneat_cli.algorithms.ACTIVATIONS`."""
     if code == 0:
         return math.tanh(max(-60.0, min(60.0, 2.5 * value)))
     if code == 1:

@@ -1,4 +1,4 @@
-"""Brains that follow a fixed rule: the baselines that nothing trains."""
+"""Brains that follow a fixed rule: the untrained baselines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from exneat_cli.tasks import Part, Task
 
 
 def acting_by_rule(rule: str, task: Task) -> Brains | None:
-    """Who acts in a task by the rule ``motionless`` or ``linear_fusion``; None for ``random``, as a runner takes it."""
+    """The brain that follows the rule ``motionless`` or ``linear_fusion`` in a task; None for ``random``."""
     if rule == "random":
         return None
     if rule == "motionless":
@@ -22,12 +22,12 @@ def acting_by_rule(rule: str, task: Task) -> Brains | None:
 
 
 def motionless(observation_size: int, resting_action: NDArray[np.float64]) -> Brains:
-    """Does the same at every step: `resting_action`, (A,)."""
+    """The brain that outputs `resting_action`, (A,), at every step."""
     return weighted_sums(np.zeros((len(resting_action), observation_size)), resting_action)
 
 
 def linear_fusion(observation_size: int, action_size: int, parts: Sequence[Part]) -> Brains:
-    """Moves to where the sum of all channels is largest: a part's actuators get that of its sensors, all others 0."""
+    """The brain that moves to where the sum of channels is largest: a part's actuators get the sum of its sensors."""
     weights = np.zeros((action_size, observation_size))
     for part in parts:
         weights[np.ix_(part.actuators, part.sensors)] = 1.0
@@ -38,7 +38,7 @@ def weighted_sums(weights: NDArray[np.float64], bias: NDArray[np.float64]) -> Br
     """The brain whose action is ``weights @ observation + bias``.
 
     Args:
-        weights: (A, observation size); zeros become no edges.
+        weights: (A, observation size); zeros do not become edges.
         bias: (A,).
     """
     actions, inputs = weights.shape

@@ -1,4 +1,4 @@
-"""Who senses and who drives what: geometry, linkage and the plan that follows. Pure data."""
+"""Wiring: geometry, linkage, and the plan of what each module senses and drives. Pure data."""
 
 from exneat_cli.wiring.linkage import LINKAGES, Linkage, peers_of
 from exneat_cli.wiring.moments import Moments, merged, pooled_by_pin, with_sensed

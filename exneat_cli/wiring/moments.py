@@ -1,4 +1,4 @@
-"""Statistics of what brains sense: per entry while episodes run, pooled per pin for algorithms that ask for them."""
+"""Statistics of the sensed values: per entry while episodes run, pooled per pin for algorithms that ask for them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from exneat_cli.wiring.plan import Plan
 
 
 class Moments(NamedTuple):
-    """Counts, means and sums of squared deviations of numbers that came one after another; of equal shapes."""
+    """Counts, means and sums of squared deviations of sequences of numbers; arrays of equal shapes."""
 
     counts: NDArray[np.float64]
     means: NDArray[np.float64]
@@ -20,7 +20,7 @@ class Moments(NamedTuple):
 
 
 def merged(parts: Iterable[Moments], size: int) -> Moments:
-    """The moments of all parts together, (size,); the order of the parts decides the last bits.
+    """The moments of all parts together, (size,); their last bits depend on the order of the parts.
 
     Source: Chan, Golub and LeVeque, "Updating formulae and a pairwise algorithm for computing sample variances",
     1979.
@@ -37,14 +37,14 @@ def merged(parts: Iterable[Moments], size: int) -> Moments:
 
 
 def with_sensed(before: Sequence[Moments], new: Sequence[Moments]) -> list[Moments]:
-    """The moments of every subpopulation's pins after some more was sensed."""
+    """The moments of each subpopulation's pins, updated with new ones."""
     return [merged(pair, pair[0].counts.size) for pair in zip(before, new, strict=True)]
 
 
 def pooled_by_pin(plan: Plan, teams: Moments) -> tuple[Moments, ...]:
-    """Of each subpopulation, the moments of its pins, (pins,), over `teams`, (T, sensed), and modules that share it.
+    """The moments of each subpopulation's pins, (pins,), over `teams`, (T, sensed), and the modules that share it.
 
-    Teams are merged in their order, within a team modules in theirs. Pins that read modules count 0.
+    Teams are merged in order, and so are the modules of each team. Pins that read modules have a count of 0.
     """
     found = []
     for index, (count, _, _) in enumerate(plan.subpopulation_shapes):

@@ -1,4 +1,4 @@
-"""The wiring plan: which pins every module has, and what it drives.
+"""The wiring plan: the input pins of every module, and what it drives.
 
 A plan is plain data. Modules come in the order of the task's parts, the central module last; pins
 come in the order in which genomes see them.
@@ -17,10 +17,10 @@ class Pin:
     """One input of a module.
 
     Attributes:
-        index: which entry of what is sensed, or which node of `module`: outputs from 0, then initial hidden nodes.
+        index: entry of the sensed values, or node of `module`: outputs from 0, then initial hidden nodes.
         module: index of the module that is read; -1 for a sensor.
-        delayed: whether the value of the previous step is read, 0 at the first; links are delayed, the
-            central module's view of its encoders is not.
+        delayed: whether it reads the value of the previous step (0 at the first step), as links do; the central
+            module reads its encoders without delay.
     """
 
     index: int
@@ -29,22 +29,22 @@ class Pin:
 
     @property
     def is_sensor(self) -> bool:
-        """Whether it reads what is sensed, not a module."""
+        """Whether it reads a sensed value rather than a module."""
         return self.module < 0
 
 
 @dataclass(frozen=True)
 class Module:
-    """One network of the brain, as wired.
+    """One network of the brain, with its wiring.
 
     Attributes:
         name: the part's name, ``central``, or ``body`` for NEAT's only module.
-        position: (x, y) seen from the trunk, x ahead and y left.
-        subpopulation: which subpopulation its genomes come from.
+        position: (x, y) seen from the trunk, x ahead and y to the left.
+        subpopulation: the subpopulation from which its genomes come.
         pins: its inputs.
         outputs: number of output nodes.
         hidden: number of initial hidden nodes.
-        drives: entries of the action that its outputs set, in order; empty for an encoder.
+        drives: entries of the action that its outputs set, in their order; empty for an encoder.
     """
 
     name: str
@@ -57,23 +57,23 @@ class Module:
 
     @property
     def sensors(self) -> tuple[int, ...]:
-        """Entries of what is sensed that it senses itself."""
+        """Entries of the sensed values that it reads directly."""
         return tuple(pin.index for pin in self.pins if pin.is_sensor)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Numbers of inputs, initial hidden nodes and outputs; sharers of genomes agree on it."""
+        """Numbers of inputs, initial hidden nodes and outputs; equal for modules that share genomes."""
         return len(self.pins), self.hidden, self.outputs
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A whole brain, as wired.
+    """The wiring of a whole brain.
 
     Attributes:
         modules: part modules in the task's order, then the central module if there is one.
-        observation_size: length of what is sensed.
-        action_size: length of the action.
+        observation_size: number of sensed values.
+        action_size: number of actuators.
     """
 
     modules: tuple[Module, ...]
@@ -87,7 +87,7 @@ class Plan:
         return tuple(shapes[index] for index in range(len(shapes)))
 
     def check(self) -> None:
-        """Refuse a plan that points outside of itself, as a damaged file's might.
+        """Refuse a plan that refers to something that does not exist, as one from a damaged file may.
 
         Raises:
             ValueError: a pin, an actuator or a subpopulation does not exist, an actuator is driven twice, or modules
@@ -103,7 +103,8 @@ class Plan:
         for m, module in enumerate(self.modules):
             first = first_sharer.setdefault(module.subpopulation, m)
             other = self.modules[first]
-            # Compiled brains size a network by one of the modules that share its genome: the others must agree.
+            # Compiled brains take a network's size from one of the modules that share its genome; the others must
+            # agree.
             if module.shape != other.shape or self.hidden_is_linked(m) != self.hidden_is_linked(first):
                 raise ValueError(f"{other.name} and {module.name} share genomes, but not numbers of pins and nodes")
             if not all(0 <= actuator < self.action_size for actuator in module.drives):
@@ -123,7 +124,7 @@ class Plan:
         return source.outputs + source.hidden
 
     def kind_of(self, pin: Pin) -> str:
-        """What a pin of this plan reads, in a word: ``sensor``, ``output`` or ``hidden``."""
+        """The kind of value that a pin of this plan reads: ``sensor``, ``output`` or ``hidden``."""
         if pin.is_sensor:
             return "sensor"
         return "output" if pin.index < self.modules[pin.module].outputs else "hidden"

@@ -1,6 +1,7 @@
-"""From a task and the settings of its modules to a plan, refusing what makes no sense.
+"""Makes a plan from a task and the settings of its modules, and refuses combinations that make no sense.
 
-Source: Zhang (2025), section 3.1; the geometry `cross` as described there (the two diagonals), not as printed.
+Source: Zhang (2025), section 3.1; the geometry `cross` is the one described there (the two diagonals), not the one
+printed.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from exneat_cli.wiring.linkage import LINKAGES
 from exneat_cli.wiring.plan import CENTRAL, Module, Pin, Plan
 
 PRINTED_VECTORS = {"fb": (0, 0, 1, 1), "lr": (0, 1, 0, 1), "cross": (0, 1, 1, 0)}
-"""Geometries that follow from where parts stand: front and back, left and right, opposite each other. For Ant's legs,
-in whatever order, they are the vectors that the thesis prints."""
+"""Geometries that follow from the parts' positions: front and back, left and right, opposite each other. For Ant's
+legs, in any order, they are these vectors, as in the thesis."""
 _ANTS_LEGS = {"front_left", "front_right", "back_left", "back_right"}
 GEOMETRIES = ("single", *PRINTED_VECTORS, "auto", "all", "custom")
 TRUNK_MODES = ("none", "shared", "module")
 _ON_THE_LINE = 1e-6
-"""Length below which a part stands neither in front nor behind, neither left nor right."""
+"""Distance below which a part counts as neither in front nor behind, neither left nor right."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Geometry:
 
     Attributes:
         name: one of `GEOMETRIES`.
-        vector: for `custom` alone, the subpopulation of each part's module, e.g. ``(0, 0, 1, 0)``.
+        vector: only for `custom`, the subpopulation of each part's module, e.g. ``(0, 0, 1, 0)``.
 
     Raises:
         ConfigError: the name is unknown, or the vector is missing, superfluous or has gaps.
@@ -79,13 +80,13 @@ class Geometry:
 
 
 def _numbered(groups: Sequence[Hashable]) -> tuple[int, ...]:
-    """Groups by number, in the order in which they come."""
+    """Numbers of the groups, in the order of their first appearance."""
     first_seen = list(dict.fromkeys(groups))
     return tuple(first_seen.index(group) for group in groups)
 
 
 def _by_position(name: str, parts: Sequence[Part]) -> tuple[int, ...]:
-    """The vector of a geometry in `PRINTED_VECTORS`, for parts that stand accordingly."""
+    """The vector of a geometry in `PRINTED_VECTORS`, for parts whose positions fit it."""
     if name == "cross":
         across = [[p for p, other in enumerate(parts) if _are_opposite(part, other)] for part in parts]
         if all(len(others) == 1 for others in across):
@@ -110,13 +111,13 @@ def _are_opposite(one: Part, other: Part) -> bool:
 
 @dataclass(frozen=True)
 class Wiring:
-    """What else there is besides part modules, and how they are connected with it.
+    """The central module, and how the trunk is sensed without one.
 
     Attributes:
-        central: whether there is a central module; None means yes where the task has a trunk and `trunk` is ``none``.
-        output_width: outputs of each part module where a central module reads them.
-        trunk: without a central module: ``shared`` lets every part module sense the trunk as well, ``module`` adds one
-            that senses the trunk and drives the trunk's own joints.
+        central: whether there is a central module; None means yes if the task has a trunk and `trunk` is ``none``.
+        output_width: outputs of each part module if a central module reads them.
+        trunk: without a central module, ``shared`` lets every part module also sense the trunk, and ``module`` adds a
+            module that senses the trunk and drives the trunk's own joints.
 
     Raises:
         ConfigError: a value is out of range.
@@ -134,7 +135,7 @@ class Wiring:
 
 
 def plan_body(task: Task, *, hidden: int) -> Plan:
-    """The plan of one module that senses and drives everything, with this many initial hidden nodes."""
+    """The plan of one module that senses and drives everything, with `hidden` initial hidden nodes."""
     actuators = tuple(range(len(task.actuator_names)))
     pins = tuple(map(Pin, task.whole))
     body = Module("body", (0.0, 0.0), 0, pins, outputs=len(actuators), hidden=hidden, drives=actuators)
@@ -142,17 +143,17 @@ def plan_body(task: Task, *, hidden: int) -> Plan:
 
 
 def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *, hidden: int) -> Plan:
-    """The plan of a module for each part of the body, and maybe a central one.
+    """The plan of a module for each part of the body and, depending on `wiring`, one for the trunk.
 
     Args:
-        task: gives parts, trunk and sizes.
+        task: provides parts, trunk and sizes.
         geometry: which modules share genomes.
         linkage: one of `LINKAGES`.
-        wiring: the central module's settings.
+        wiring: settings of the central module and the trunk.
         hidden: initial hidden nodes of every module.
 
     Raises:
-        ConfigError: the combination makes no sense, naming the key to change.
+        ConfigError: the combination makes no sense; the key is the one to change.
     """
     check_choice("linkage", linkage, tuple(LINKAGES))
     parts = task.parts
@@ -182,7 +183,7 @@ def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *
 
 
 def _has_central(task: Task, wiring: Wiring) -> bool:
-    """Whether there is a central module; refuses settings of the trunk that do not go with that."""
+    """Whether there is a central module; refuses settings of the trunk that are incompatible with it."""
     named, trunk = f"task={task.name}", task.trunk
     central = trunk is not None and wiring.trunk == "none" if wiring.central is None else wiring.central
     if trunk is None and (central or wiring.trunk != "none"):
@@ -207,7 +208,7 @@ def _has_central(task: Task, wiring: Wiring) -> bool:
 
 
 def _links(task: Task, linkage: str, outputs: Sequence[int], hidden: int, *, central: bool) -> list[tuple[Pin, ...]]:
-    """The extra pins of each part module; refuses those that read what is not there."""
+    """The links of each part module; refuses a linkage that reads something that does not exist."""
     links = _pins(task, linkage, outputs, hidden)
     if why := _refusal(task, linkage, links, outputs, hidden, central=central):
         fitting = [
@@ -229,7 +230,7 @@ def _pins(task: Task, linkage: str, outputs: Sequence[int], hidden: int) -> list
 def _refusal(
     task: Task, linkage: str, links: Sequence[Sequence[Pin]], outputs: Sequence[int], hidden: int, *, central: bool
 ) -> str:
-    """All that links read and is not there, with what to set; empty if there is nothing such."""
+    """What links would read that does not exist, and what to set; empty if nothing is missing."""
     parts, pins = len(task.parts), [pin for own in links for pin in own]
     if linkage != "none" and parts > 1 and not pins:
         return f"task={task.name} has nothing that such links could read"
@@ -243,7 +244,7 @@ def _refusal(
 
 
 def _trunk_module(task: Task, others: Sequence[Module], hidden: int, *, central: bool) -> Module:
-    """The module that senses the trunk, and drives its joints; a central one reads the others too and drives all."""
+    """The module that senses the trunk and drives its joints; a central one also reads the others and drives all."""
     assert task.trunk is not None
     read = [Pin(k, own) for own, other in enumerate(others) for k in range(other.outputs)] if central else []
     actuators = tuple(range(len(task.actuator_names))) if central else task.trunk.actuators
@@ -259,7 +260,7 @@ def _trunk_module(task: Task, others: Sequence[Module], hidden: int, *, central:
 
 
 def refuse_modules(algorithm: str, geometry: Geometry, linkage: str, wiring: Wiring) -> None:
-    """Refuse settings of modules for an algorithm that has none.
+    """Refuse settings of modules for an algorithm without part modules.
 
     Raises:
         ConfigError: one of them is not at its default.

@@ -1,1 +1,1 @@
-"""Genomes in arrays, their operators, and what neat-python does with them: species, stagnation, reproduction."""
+"""Genomes in arrays, their operators, and their use by neat-python's species, stagnation and reproduction."""

@@ -1,4 +1,4 @@
-"""Array genomes as neat-python's own and as columns of a file, losing nothing; and whether what files hold is sound."""
+"""Lossless conversion of array genomes to neat-python's and to columns of a file, and checks of genomes from files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WHOLE = np.dtype(np.int64)
 
 
 def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
-    """The same genome in arrays; raises what `tables_of` raises."""
+    """The same genome in arrays; raises the errors of `tables_of`."""
     nodes, connections = tables_of(genome)
     in_order = np.sort(nodes, order="key"), np.sort(connections, order=["target", "source"])
     converted = ArrayGenome(genome.key, *in_order)
@@ -31,7 +31,7 @@ def from_stock(genome: neat.DefaultGenome) -> ArrayGenome:
 
 
 def to_stock(genome: ArrayGenome) -> neat.DefaultGenome:
-    """The same genome as neat-python's own, with its genes in the same order."""
+    """The same genome as one of neat-python's, with its genes in the same order."""
     converted = neat.DefaultGenome(genome.key)
     converted.fitness = genome.fitness
     for key, bias, response, activation in genome.nodes.tolist():
@@ -50,7 +50,7 @@ def tables_of(genome: ArrayGenome | neat.DefaultGenome) -> tuple[Nodes, Connecti
     """Nodes and connections in the genome's own order.
 
     Raises:
-        ExneatError: a node has an activation, aggregation or time constant that arrays do not hold.
+        ExneatError: a node has an activation, aggregation or time constant that arrays do not support.
     """
     if isinstance(genome, ArrayGenome):
         return genome.nodes, genome.connections
@@ -70,10 +70,10 @@ def _node_row(gene: DefaultNodeGene) -> tuple[int, float, float, int]:
 
 
 def check_genes(genome: ArrayGenome) -> None:
-    """Refuse a genome whose genes, in any order, make no graph.
+    """Refuse a genome whose genes, in any order, do not form a graph.
 
     Raises:
-        ValueError: a node or connection comes twice, a node's key is below 0, an activation does not exist, or a
+        ValueError: a node or connection occurs twice, a node's key is below 0, an activation does not exist, or a
             connection has an end that does not exist.
     """
     key, nodes, connections = genome.key, genome.nodes, genome.connections
@@ -91,11 +91,11 @@ def check_genes(genome: ArrayGenome) -> None:
 
 
 def check_genome(genome: ArrayGenome, inputs: int, outputs: int, *, feed_forward: bool) -> None:
-    """Refuse a genome, a graph by `check_genes`, that would not make a network of this shape.
+    """Refuse a genome that has passed `check_genes` but is not a network of this shape.
 
     Raises:
-        ValueError: it reads other pins than -1 to -inputs or lacks one of the nodes 0 to outputs - 1, or it is
-            `feed_forward` and connections, enabled or not, close a cycle.
+        ValueError: it reads pins other than -1 to -inputs or lacks one of the nodes 0 to outputs - 1, or it must be
+            `feed_forward` and its connections, enabled or not, form a cycle.
     """
     sources = genome.connections["source"]
     if not set(range(outputs)) <= set(genome.nodes["key"].tolist()):
@@ -114,9 +114,9 @@ def check_genome(genome: ArrayGenome, inputs: int, outputs: int, *, feed_forward
 
 
 def pack(genomes: Sequence[ArrayGenome | neat.DefaultGenome], prefix: str) -> dict[str, NDArray[Any]]:
-    """Ids, numbers of genes and any mutation powers of each genome, and every field of all genes end to end.
+    """Ids, numbers of genes and any mutation powers of the genomes, and each field of all genes, end to end.
 
-    Names begin with `prefix`.
+    The names of columns begin with `prefix`.
     """
     columns: dict[str, NDArray[Any]] = {f"{prefix}.id": np.array([genome.key for genome in genomes], _WHOLE)}
     powers = [genome.power for genome in genomes if isinstance(genome, ArrayGenome)]
@@ -133,17 +133,17 @@ def pack(genomes: Sequence[ArrayGenome | neat.DefaultGenome], prefix: str) -> di
 def unpack(
     columns: Columns, prefix: str, shape: tuple[int, int, int], *, feed_forward: bool, stock: bool = False
 ) -> list[Any]:
-    """The genomes that `pack` was given.
+    """The genomes that were packed by `pack`.
 
     Args:
-        columns: from `pack`, or from a file of anyone's.
-        prefix: as it was.
-        shape: of the networks that they must make: inputs, initial hidden nodes and outputs.
-        feed_forward: whether these must have no cycle.
-        stock: whether the genomes become neat-python's own again, else arrays.
+        columns: from `pack`, or from an untrusted file.
+        prefix: the one given to `pack`.
+        shape: required numbers of inputs, initial hidden nodes and outputs of the networks.
+        feed_forward: whether networks must not have cycles.
+        stock: whether to make neat-python's own genomes rather than array genomes.
 
     Raises:
-        KeyError, ValueError: a column is missing, of the wrong type or length, or the genes make no such network.
+        KeyError, ValueError: a column is missing or of the wrong type or length, or genes do not form such a network.
     """
     keys = _column(columns, f"{prefix}.id", _WHOLE)
     if len(np.unique(keys)) < len(keys):
@@ -197,7 +197,7 @@ def pack_teams(teams: Sequence[Team], prefix: str) -> dict[str, NDArray[Any]]:
 
 
 def unpack_teams(columns: Columns, prefix: str, problem: Problem) -> list[Team]:
-    """The teams that `pack_teams` was given, from anyone's file; their genomes must make the problem's networks.
+    """The teams that were packed by `pack_teams`, from an untrusted file; their genomes must fit the problem.
 
     Raises:
         KeyError, ValueError: a column is missing or damaged, or a genome does not fit.

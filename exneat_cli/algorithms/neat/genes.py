@@ -1,10 +1,10 @@
-"""What a genome consists of: two tables, one row per gene; compiled questions to their graph, and compiled operators.
+"""The genes of a genome: two tables with one row per gene, compiled queries of their graph, and compiled operators.
 
-Rows are sorted, nodes by `key` and connections by (`target`, `source`): two genomes are compared and crossed
-in one pass, and a network finds the connections into a node side by side.
+Rows are sorted, nodes by `key` and connections by (`target`, `source`), so that two genomes are compared and crossed
+in one pass, and the connections into a node are adjacent.
 
 Source of crossover, distance and mutation: Stanley and Miikkulainen, "Evolving neural networks through augmenting
-topologies" (2002), sections 3.1 to 3.3, in neat-python's form, which is said at each.
+topologies" (2002), sections 3.1 to 3.3, with neat-python's deviations, which are named at each operator.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ACTIVATIONS = ("tanh", "relu", "sigmoid", "identity", "clamped")
 NODE = np.dtype(
     [("key", np.int64), ("bias", np.float64), ("response", np.float64), ("activation", np.int64)], align=True
 )
-"""Outputs have the keys 0, 1, ...; then come initial hidden nodes, then those that mutations added."""
+"""Outputs have the keys 0, 1, ...; initial hidden nodes follow, then nodes added by mutations."""
 
 CONNECTION = np.dtype(
     [
@@ -35,7 +35,7 @@ CONNECTION = np.dtype(
     ],
     align=True,
 )
-"""`source` is a node's key, or -1 - k for input pin k. `innovation` numbers the mutation that it began with."""
+"""`source` is a node's key, or -1 - k for input pin k. `innovation` is the number of the mutation that created it."""
 
 Nodes = NDArray[np.void]
 Connections = NDArray[np.void]
@@ -43,22 +43,22 @@ Genes = tuple[Nodes, Connections]
 """All genes of one genome."""
 
 Number = tuple[float, float, float, float, float, float, float]
-"""How one attribute that is a number begins and changes: mean, sd, shift_rate, replace_rate, power, low and high. Drawn
-anew, with the chance replace_rate, it is N(mean, sd); a shift, with the chance shift_rate, adds N(0, power); it never
-leaves [low, high]."""
+"""How a numeric attribute starts and changes: mean, sd, shift_rate, replace_rate, power, low and high. It is drawn anew
+from N(mean, sd) with probability replace_rate, or shifted by N(0, power) with probability shift_rate, and clipped to
+[low, high]."""
 
 STAYS_DISABLED = 0.75
-"""Chance that a gene is disabled which is disabled in a parent (the 2002 paper, section 4.1)."""
+"""Probability with which crossover disables a gene that is disabled in either parent (the 2002 paper, section 4.1)."""
 
 
 def end_to_end(tables: Iterable[NDArray[np.void]], kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """All rows of all tables, which are of this kind; bytes are copied, where NumPy would go field by field."""
+    """All rows of all tables of this kind; copies bytes, which is faster than NumPy's copy field by field."""
     return np.frombuffer(bytearray().join(table.data for table in tables), kind)
 
 
 @compiled
 def row_of(connections: Connections, target: int, source: int) -> int:
-    """Row of the first connection that is not before (`target`, `source`): where it is, or belongs."""
+    """Row of the first connection that is not before (`target`, `source`): the row where it is, or belongs."""
     low, high = 0, connections.size
     while low < high:
         middle = (low + high) // 2
@@ -84,8 +84,8 @@ def node_row(nodes: Nodes, key: int) -> int:
 
 @compiled
 def mark_sources(nodes: Nodes, connections: Connections, marked: NDArray[np.bool_], only_enabled: bool) -> None:
-    """Mark, beside the nodes in `marked`, (N,), every node that leads to one of them; maybe by enabled genes alone."""
-    stack = np.empty(nodes.size, np.int64)  # rows that are marked, but whose sources are not yet
+    """Mark all nodes that lead to a node in `marked`, (N,), through all or only enabled connections, in place."""
+    stack = np.empty(nodes.size, np.int64)  # rows that are marked, but whose sources are not yet marked
     depth = 0
     for row in range(nodes.size):
         if marked[row]:
@@ -107,7 +107,7 @@ def mark_sources(nodes: Nodes, connections: Connections, marked: NDArray[np.bool
 
 @compiled
 def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, source: int) -> bool:
-    """Whether a connection from `source` to `target` would make a graph without cycles have one."""
+    """Whether a connection from `source` to `target` would add a cycle to a graph without cycles."""
     if source < 0:
         return False
     marked = np.zeros(nodes.size, np.bool_)
@@ -120,8 +120,8 @@ def would_close_a_cycle(nodes: Nodes, connections: Connections, target: int, sou
 def cross(fitter: Genes, other: Genes, average: bool, rng: Generator) -> Genes:
     """The genes of a child.
 
-    Matching genes mix attribute by attribute; their weights and biases may be averaged instead. All others come from
-    the fitter parent, so that a child's graph is that parent's and cannot have a cycle which that has not.
+    Matching genes are mixed attribute by attribute; their weights and biases may be averaged instead. All other genes
+    come from the fitter parent, so that the child has that parent's graph and no additional cycles.
     """
     return _cross_nodes(fitter[0], other[0], average, rng), _cross_connections(fitter[1], other[1], average, rng)
 
@@ -131,7 +131,7 @@ def _cross_nodes(fitter, other, average, rng):  # type: ignore[no-untyped-def]
     child = fitter.copy()
     j = 0
     for i in range(child.size):
-        # Both tables are sorted: one pass finds what matches.
+        # Both tables are sorted, so one pass finds the matching genes.
         while j < other.size and other[j].key < child[i].key:
             j += 1
         if j < other.size and other[j].key == child[i].key:
@@ -170,10 +170,10 @@ def _cross_connections(fitter, other, average, rng):  # type: ignore[no-untyped-
 
 @compiled
 def genetic_distance(one: Genes, other: Genes, disjoint_coefficient: float, weight_coefficient: float) -> float:
-    """Distance of two genomes, at least 0; symmetric but for rounding.
+    """Genetic distance of two genomes, at least 0; symmetric up to rounding.
 
-    Equation 1 of the paper, but excess and disjoint genes count alike, differences are not averaged over matching
-    genes alone, nodes count as well as connections, and connections match by the nodes that they join.
+    Equation 1 of the paper, except that excess and disjoint genes count alike, differences are not averaged over
+    matching genes only, nodes count as well as connections, and connections match by the nodes that they join.
     """
     distance = 0.0
     most_nodes, most_connections = max(one[0].size, other[0].size), max(one[1].size, other[1].size)
@@ -203,7 +203,7 @@ def _compare_nodes(one, other):  # type: ignore[no-untyped-def]
 
 @compiled
 def _compare_connections(one, other):  # type: ignore[no-untyped-def]
-    """The same of connections, which match by the nodes that they join."""
+    """The same for connections, which match by the nodes that they join."""
     difference, matched = 0.0, 0
     i = j = 0
     while i < one.size and j < other.size:
@@ -218,7 +218,7 @@ def _compare_connections(one, other):  # type: ignore[no-untyped-def]
 
 @compiled
 def draw(number: Number, rng: Generator) -> float:
-    """A new value."""
+    """A new value of a numeric attribute."""
     mean, sd, _, _, _, low, high = number
     return max(min(mean + sd * rng.standard_normal(), high), low)
 
@@ -235,12 +235,12 @@ def mutate_attributes(
     """Change weights, enabled flags, biases and responses in place: each is shifted, drawn anew or left.
 
     Args:
-        genes: of one genome.
+        genes: genes of one genome.
         numbers: how weights, biases and responses change.
-        disable_rate: chance that an enabled connection's flag is drawn anew, either way with equal chance.
-        enable_rate: the same of a disabled connection.
-        sensitivity: (pins,) what shifts of the weights that read these are divided by.
-        rng: of all draws.
+        disable_rate: probability that the flag of an enabled connection is drawn anew, true or false with equal chance.
+        enable_rate: the same for a disabled connection.
+        sensitivity: (pins,) divisors of the shifts of weights that read these pins.
+        rng: generator of all draws.
     """
     (nodes, connections), (weight, bias, response) = genes, numbers
     for i in range(connections.size):

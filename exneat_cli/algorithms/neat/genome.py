@@ -1,7 +1,7 @@
-"""neat-python's genome with its genes in two tables and its operators compiled.
+"""neat-python's genome with its genes in two tables and with compiled operators.
 
-Same rules, same chances, other random numbers: neat-python's species, stagnation and reproduction stay in charge and
-see no difference but speed. Wherever a method takes a `config`, that is the `genome_config` of `neat_config`.
+Rules and probabilities are the same, random numbers are not: neat-python's species, stagnation and reproduction remain
+in charge and see no difference except in speed. Every `config` in a method is the `genome_config` of `neat_config`.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ _NUMBERS = {name: attrgetter(*(f"{name}_{item}" for item in _ITEMS)) for name in
 
 
 def number(config: DefaultGenomeConfig, name: str) -> Number:
-    """How the attribute ``weight``, ``bias`` or ``response`` begins and changes."""
+    """How the attribute ``weight``, ``bias`` or ``response`` starts and changes."""
     values: Number = _NUMBERS[name](config)
     return values
 
 
 class ArrayGenome:
-    """A genome that neat-python's reproduction and species take in place of `neat.DefaultGenome`.
+    """A genome that neat-python's reproduction and species accept in place of `neat.DefaultGenome`.
 
     Attributes:
         key: its id.
         fitness: None until it is known.
-        nodes: (N,) of kind `NODE`, sorted; never changed in place once the genome is made.
-        connections: (C,) of kind `CONNECTION`, likewise.
-        power: its own `weight_mutate_power` where mutation is adaptive, else None.
+        nodes: (N,) of type `NODE`, sorted; not changed in place after reproduction.
+        connections: (C,) of type `CONNECTION`, likewise.
+        power: its own `weight_mutate_power` if mutation is adaptive, else None.
     """
 
     __slots__ = ("connections", "fitness", "key", "nodes", "power")
@@ -83,10 +83,10 @@ class ArrayGenome:
             self.power = config.weight_mutate_power
 
     def configure_crossover(self, genome1: ArrayGenome, genome2: ArrayGenome, config: DefaultGenomeConfig) -> None:
-        """Make a child; of equally fit parents the second one counts as fitter, as in neat-python.
+        """Make a child; of equally fit parents, the second one counts as fitter, as in neat-python.
 
-        With the chance 1 - `crossover_prob` it is a copy of the first, whatever their fitness. A child of two has the
-        geometric mean of their mutation powers.
+        With probability 1 - `crossover_prob` it is a copy of the first parent, whatever their fitness. A child of two
+        parents has the geometric mean of their mutation powers.
         """
         if config.crossover_prob < 1.0 and config.generator.random() >= config.crossover_prob:
             self.nodes, self.connections, self.power = genome1.nodes.copy(), genome1.connections.copy(), genome1.power
@@ -116,11 +116,12 @@ class ArrayGenome:
         mutate_attributes(self.genes, numbers, disable_rate, enable_rate, config.sensitivity, rng)
 
     def _vary_power(self, config: DefaultGenomeConfig) -> float:
-        """Vary the genome's own mutation power; returns its share of the one that all genomes began with.
+        """Vary the genome's own mutation power; returns its ratio to the initial power of all genomes.
 
         Log-normal self-adaptation of one step size, with the learning rate 1 / sqrt(n) of n weights and biases
         (Schwefel, "Numerical optimization of computer models", 1981; Beyer and Schwefel, "Evolution strategies",
-        Natural Computing 1, 2002, section 4.2). Without a lower bound it collapses: small changes do the least harm.
+        Natural Computing 1, 2002, section 4.2). Without a lower bound it would collapse, since small changes do the
+        least harm.
         """
         assert self.power is not None
         rate = 1.0 / math.sqrt(self.nodes.size + self.connections.size)
@@ -153,7 +154,7 @@ class ArrayGenome:
             self.connections = table[(table["target"] != key) & (table["source"] != key)]
 
     def _add_connection(self, config: DefaultGenomeConfig) -> None:
-        """Try one random pair of nodes; nothing happens if it is connected or must not be."""
+        """Try to connect one random pair of nodes; does nothing if it is connected already or must not be."""
         rng, pins, outputs = config.generator, config.num_inputs, config.num_outputs
         target = int(self.nodes["key"][rng.integers(self.nodes.size)])
         # As in neat-python, new connections lead from pins and hidden nodes, not from outputs.
@@ -168,7 +169,7 @@ class ArrayGenome:
         self._insert(target, source, innovation, draw(number(config, "weight"), rng))
 
     def _insert(self, target: int, source: int, innovation: int, weight: float) -> None:
-        """Put a new, enabled connection in its place."""
+        """Insert a new, enabled connection in its sorted place."""
         row = row_of(self.connections, target, source)
         self.connections = _with(self.connections, row, (target, source, innovation, weight, True))
 
@@ -183,18 +184,18 @@ class ArrayGenome:
 
 
 def _scaled(number: Number, scale: float) -> Number:
-    """The same, but shifts are N(0, power * scale)."""
+    """The same, with shifts of N(0, power * scale)."""
     mean, sd, shift_rate, replace_rate, power, low, high = number
     return mean, sd, shift_rate, replace_rate, power * scale, low, high
 
 
 def _with(table: NDArray[np.void], row: int, gene: tuple[float, ...]) -> NDArray[np.void]:
-    """A copy with one gene more, in this row."""
+    """A copy with one more gene, in this row."""
     return end_to_end((table[:row], np.array([gene], table.dtype), table[row:]), table.dtype)
 
 
 def _without(table: NDArray[np.void], row: int) -> NDArray[np.void]:
-    """A copy that lacks one row."""
+    """A copy without this row."""
     return end_to_end((table[:row], table[row + 1 :]), table.dtype)
 
 

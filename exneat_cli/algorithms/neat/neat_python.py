@@ -1,11 +1,11 @@
-"""What reaches into neat-python 2.0.0, but for the species that `Subpopulation` restores.
+"""All code that depends on internals of neat-python 2.0.0, except for the restoring of species in `Subpopulation`.
 
-Its species, stagnation and reproduction stay in charge. What is reached into, and why:
+neat-python's species, stagnation and reproduction stay in charge. What is changed, and why:
 
-* its random numbers come from Python's global generator, which any thread may draw from: `drawing_from`;
-* its reproduction aborts when species are many, and gives every genome hidden nodes of its own: `SteadyReproduction`;
+* its random numbers come from Python's global generator, from which any thread may draw: `drawing_from`;
+* its reproduction aborts with many species, and gives every genome hidden nodes of its own: `SteadyReproduction`;
 * its counters cannot be read: `counter` and `peek`;
-* its configuration is read from an INI file alone: `neat_config`, and `config_text` for one of them.
+* its configuration can only be read from an INI file: `neat_config`, and `config_text`, which writes such a file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from exneat_cli.algorithms.neat.settings import STOCK, EvolutionSettings
 from exneat_cli.interruption import uninterrupted
 
 LARGEST_ID = 2**62
-"""No id, key or number reaches it."""
+"""Upper bound, never reached, of all ids, keys and innovation numbers."""
 
 _GENOMES = {"array": ArrayGenome, "stock": neat.DefaultGenome}
 _DRAWN = [
@@ -44,7 +44,7 @@ _DRAWN = [
     for name, value in vars(module).items()
     if value is random or getattr(value, "__self__", None) is random.random.__self__  # type: ignore[attr-defined]
 ]
-"""The names in neat-python's modules that stand for `random`, or for a method of its global generator."""
+"""The names in neat-python's modules that refer to `random` or to a method of its global generator."""
 _DRAWING = threading.Lock()
 _FIXED = """
 weight_init_mean=0 bias_init_mean=0 enabled_default=True single_structural_mutation=False
@@ -52,8 +52,8 @@ response_init_mean=1 response_init_stdev=0 response_min_value=-1 response_max_va
 response_mutate_rate=0 response_replace_rate=0 response_mutate_power=0
 activation_mutate_rate=0 aggregation_default=sum aggregation_options=sum aggregation_mutate_rate=0
 """
-"""Items of a genome that no setting changes. Left out, `single_structural_mutation` is the text "false", which
-neat-python takes for true."""
+"""Items of a genome that no setting changes. By default, `single_structural_mutation` is the text "false", which
+neat-python treats as true."""
 
 
 _OURS = (
@@ -64,24 +64,24 @@ _OURS = (
 
 
 class RankedParents(random.Random):
-    """Python's generator, but of a sequence, best first, it chooses the first of n with a chance of about 2 / n.
+    """Python's generator, but `choice` favours early items: the first of n has a chance of about 2 / n.
 
-    neat-python chooses parents so, and array genomes nothing else. The better of two uniform draws is linear ranking
-    (Blickle and Thiele, "A comparison of selection schemes used in evolutionary algorithms", Evolutionary Computation
-    4(4), 1996).
+    With it neat-python chooses parents, from a list with the best first, and nothing else if genomes are in arrays. To
+    take the better of two uniform draws is linear ranking (Blickle and Thiele, "A comparison of selection schemes used
+    in evolutionary algorithms", Evolutionary Computation 4(4), 1996).
     """
 
     def choice(self, seq: Any) -> Any:
-        """One of them."""
+        """One item of `seq`."""
         return seq[min(self.randrange(len(seq)), self.randrange(len(seq)))]
 
 
 @contextmanager
 def drawing_from(chance: random.Random) -> Iterator[None]:
-    """While inside, neat-python draws from `chance` instead of Python's global generator.
+    """Within the block, neat-python draws from `chance` instead of Python's global generator.
 
-    Other threads draw from that one whenever they like (dask's do), also while genomes reproduce. One training at a
-    time is let in. Signals are put off, see `uninterrupted`.
+    Other threads (such as dask's) may draw from the global one at any time, even while genomes reproduce. Only one
+    training at a time may enter. Signals are deferred, see `uninterrupted`.
     """
     with uninterrupted(), _DRAWING:
         try:
@@ -94,12 +94,12 @@ def drawing_from(chance: random.Random) -> Iterator[None]:
 
 
 def counter(following: int) -> Iterator[int]:
-    """`following`, then the next whole number, and so on: `itertools.count`, but `peek` can read it."""
+    """Whole numbers from `following` on, like `itertools.count`, but readable by `peek`."""
     return iter(range(following, LARGEST_ID))
 
 
 def peek(numbers: Iterator[int]) -> int:
-    """What a `counter` gives next, without taking it."""
+    """The next number of a `counter`, without taking it."""
     return next(copy.copy(numbers))
 
 
@@ -109,13 +109,13 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
     def __init__(self, config: Any, reporters: ReporterSet, stagnation: Any) -> None:
         super().__init__(config, reporters, stagnation)
         self.genome_indexer = counter(1)
-        self.first_parents: dict[int, int] = {}  # of the offspring that were made last
+        self.first_parents: dict[int, int] = {}  # of the last generation's offspring
 
     def create_new(self, genome_type: Any, genome_config: Any, num_genomes: int) -> dict[int, Any]:
-        """Initial genomes by id, in which the initial hidden nodes have the same keys.
+        """Initial genomes by id, whose initial hidden nodes have the same keys.
 
-        neat-python counts on from genome to genome. Crossover and distance then see no hidden node in common, and
-        every genome founds a species of its own.
+        neat-python continues to count from genome to genome. For crossover and distance, genomes would then have no
+        hidden nodes in common, and every genome would found a species of its own.
         """
         first, hidden = genome_config.num_outputs, genome_config.num_hidden
         later_nodes = genome_config.node_indexer or counter(first + hidden)
@@ -133,10 +133,10 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
     def reproduce(
         self, config: neat.Config, species: DefaultSpeciesSet, pop_size: int, generation: int
     ) -> dict[int, Any]:
-        """The next generation by id, after elitism and minimum species size were made to fit.
+        """The next generation by id, after elitism and minimum species size have been adjusted.
 
-        neat-python stops a run when the species together may claim more than the population. And elitism is raised
-        until all species together keep `survivors` genomes.
+        neat-python aborts a run when its species may together claim more than the population, so both are reduced if
+        necessary. Elitism is also raised until all species together keep `survivors` genomes.
         """
         configured = self.reproduction_config
         elitism, min_species_size = configured.elitism, configured.min_species_size
@@ -150,12 +150,12 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
         finally:
             configured.elitism, configured.min_species_size = elitism, min_species_size
         self.first_parents = {key: parents[0] for key, parents in self.ancestors.items() if parents}
-        # neat-python keeps every genome's parents for ever, and asks for none of them.
+        # neat-python would keep every genome's parents for ever, without using them.
         self.ancestors.clear()
         return genomes
 
     def _adjust_spawn_exact(self, spawn_amounts: list[int], pop_size: int, min_species_size: int) -> list[int]:
-        # neat-python takes one genome away from each species and stops the run if that was not enough.
+        # neat-python removes one genome from each species, and aborts the run if that is not enough.
         amounts = list(spawn_amounts)
         while sum(amounts) > pop_size:
             for index in sorted(range(len(amounts)), key=lambda index: -amounts[index]):
@@ -168,11 +168,11 @@ class SteadyReproduction(neat.DefaultReproduction):  # type: ignore[misc]
 def neat_config(
     settings: EvolutionSettings, population: int, shape: tuple[int, int, int], survivors: int = 0
 ) -> neat.Config:
-    """A neat-python configuration for one subpopulation, equal to one that `neat.Config` reads from a file.
+    """A neat-python configuration for one subpopulation, as `neat.Config` would read it from a file.
 
-    `shape` is inputs, initial hidden nodes and outputs; so many genomes at least survive a generation. Its
-    `genome_config` has more attributes: settings of ours, `generator`, which must be set before array genomes are
-    made, since they draw from it, and `sensitivity`, (inputs,), which shifts of weights are divided by.
+    `shape` is inputs, initial hidden nodes and outputs; at least `survivors` genomes survive each generation. Its
+    `genome_config` has further attributes: our own settings; `generator`, from which array genomes draw, and which must
+    be set before they are made; and `sensitivity`, (inputs,), by which shifts of weights are divided.
     """
     inputs, hidden, outputs = shape
     config = neat.Config.__new__(neat.Config)
@@ -193,7 +193,7 @@ def neat_config(
     config.genome_config = _parsed(
         neat.DefaultGenome,
         settings,
-        vars(settings),  # it passes over those that it does not know
+        vars(settings),  # it ignores those that it does not know
         **dict(item.split("=") for item in _FIXED.split()),
         num_inputs=inputs,
         num_hidden=hidden,
@@ -210,9 +210,9 @@ def neat_config(
 
 
 def config_text(settings: EvolutionSettings, shape: tuple[int, int, int]) -> str:
-    """The configuration as a file of neat-python's, without the settings that are ours alone.
+    """The configuration as the text of a neat-python file, without the settings that neat-python does not have.
 
-    `shape` is inputs, initial hidden nodes and outputs. The population, which neat-python asks for too, is 100.
+    `shape` is inputs, initial hidden nodes and outputs. The population, which neat-python also requires, is 100.
     """
     config = neat_config(dataclasses.replace(settings, genome="stock", **STOCK), 100, shape)
     config.reproduction_type = neat.DefaultReproduction
@@ -226,6 +226,6 @@ def config_text(settings: EvolutionSettings, shape: tuple[int, int, int]) -> str
 
 
 def _parsed(kind: Any, settings: EvolutionSettings, names: Iterable[str], **others: object) -> Any:
-    """What `kind` makes of some of the settings, which have neat-python's names, and others; a file is all text."""
+    """The configuration that `kind` parses from some settings and others, all passed as text, as from a file."""
     items = {name: getattr(settings, name) for name in names} | others
     return kind.parse_config({name: str(value) for name, value in items.items()})

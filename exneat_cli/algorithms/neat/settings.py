@@ -1,4 +1,4 @@
-"""Settings of evolution, under neat-python's names; `conf/evolution` spells them with a comment each."""
+"""Settings of evolution, under neat-python's names; `conf/evolution` lists them, each with a comment."""
 
 from __future__ import annotations
 
@@ -30,52 +30,52 @@ STOCK: dict[str, Any] = {
     "crossover_prob": 1.0,
     "parent_selection": "uniform",
 }
-"""What neat-python's own genomes do, where array genomes have a choice."""
+"""The behaviour of neat-python's own genomes, where array genomes have a choice."""
 LEAST_SENSITIVITY = 0.05
-"""In a pin's unit. One that hardly ever leaves 0 would be blown up when it does."""
+"""Minimum, in a pin's unit: without it, weights of an input that is almost always 0 would change too much."""
 _AT_LEAST_ONE = ("min_species_size", "max_stagnation")
 _SHARES = ("_rate", "_prob", "survival_threshold")
-"""Endings of the names of what is a probability; other real numbers are only not negative."""
+"""Endings of the names of probabilities; other real numbers need only be at least 0."""
 
 
 @dataclass(frozen=True)
 class EvolutionSettings:
-    """How genomes start, change and compete; the defaults are Ant's.
+    """How genomes start, change and compete; the defaults are those of Ant.
 
-    Terms and their meaning are neat-python's (Stanley and Miikkulainen, "Evolving neural networks through
+    Names and their meanings are neat-python's (Stanley and Miikkulainen, "Evolving neural networks through
     augmenting topologies", 2002). Rates and shares are probabilities in [0, 1].
 
     Attributes:
-        genome: ``array`` for compiled operators, ``stock`` for neat-python's own, which are slower and draw
+        genome: ``array`` for compiled operators, ``stock`` for neat-python's own genomes, which are slower and draw
             other random numbers.
-        feed_forward: feed-forward networks, else recurrent ones.
-        activation_default: of every node, with neat-python's scaling, e.g. tanh(2.5 x).
-        output_activation: of outputs, if other than that; ``clamped`` is x cut to [-1, 1].
+        feed_forward: whether networks are feed-forward; otherwise they are recurrent.
+        activation_default: activation of every node, with neat-python's scaling, e.g. tanh(2.5 x).
+        output_activation: activation of outputs, if different; ``clamped`` is x clipped to [-1, 1].
         initial_connection: connections of the first generation.
         neat_hidden, module_hidden: initial hidden nodes of NEAT's network, and of every ExNEAT module.
-        positive_start: initial weights are abs(N(0, sd)); weights that mutations draw keep their sign.
-        mutation: ``fixed`` power, or ``adaptive``: every genome carries a weight_mutate_power of its own, inherits and
-            varies it between weight_mutate_power_min and weight_mutate_power_max; bias_mutate_power goes along.
-        safe_mutation: shifts of a weight that reads a sensor are divided by the root mean square of what was sensed
-            there in training so far, at least `LEAST_SENSITIVITY`: so much more the outputs change with that weight.
-            SM-G of Lehman et al., "Safe mutations for deep and recurrent neural networks through output gradients",
-            GECCO 2018, whose gradient of a linear output with respect to a weight is its input.
-        weight_*, bias_*: initial values are N(0, init_stdev); a mutation adds N(0, mutate_power) to the share
-            mutate_rate and draws the share replace_rate anew; values stay in [-max_value, max_value].
-        enabled_mutate_rate: share of connections whose enabled flag a mutation draws anew.
-        conn_add_prob, conn_delete_prob, node_add_prob, node_delete_prob: chance of each structural mutation.
+        positive_start: whether initial weights are abs(N(0, sd)); weights drawn by mutations may still be negative.
+        mutation: ``fixed`` power, or ``adaptive``: every genome carries its own weight_mutate_power, which is inherited
+            and varied between weight_mutate_power_min and weight_mutate_power_max; bias_mutate_power is scaled with it.
+        safe_mutation: whether shifts of a weight that reads a sensor are divided by the root mean square of the
+            sensor's values in training so far (at least `LEAST_SENSITIVITY`), to which the weight's effect is
+            proportional. This is SM-G of Lehman et al., "Safe mutations for deep and recurrent neural networks
+            through output gradients", GECCO 2018: the gradient of a linear output by a weight is the weight's input.
+        weight_*, bias_*: initial values are N(0, init_stdev); a mutation adds N(0, mutate_power) with probability
+            mutate_rate, or draws anew with probability replace_rate; values stay in [-max_value, max_value].
+        enabled_mutate_rate: probability that a mutation draws a connection's enabled flag anew.
+        conn_add_prob, conn_delete_prob, node_add_prob, node_delete_prob: probability of each structural mutation.
         crossover: whether a child's matching genes ``choose`` each weight and bias from one of the parents, as in
-            neat-python, or take the ``average``: intermediate recombination, by which mutations that do harm cancel
-            out in part (Beyer and Schwefel, "Evolution strategies", Natural Computing 1, 2002).
-        crossover_prob: share of children with two parents; neat-python's way is 1.
-        parent_selection: ``uniform`` among those that may have offspring, as in neat-python, or by ``rank``.
-        compatibility_disjoint_coefficient, compatibility_weight_coefficient: of the genetic distance.
+            neat-python, or take their ``average``: intermediate recombination, by which harmful mutations partly cancel
+            out (Beyer and Schwefel, "Evolution strategies", Natural Computing 1, 2002).
+        crossover_prob: probability that a child has two parents; 1 in neat-python.
+        parent_selection: ``uniform`` among genomes that may have offspring, as in neat-python, or by ``rank``.
+        compatibility_disjoint_coefficient, compatibility_weight_coefficient: coefficients of the genetic distance.
         compatibility_threshold: genomes closer than this share a species.
-        elitism: best genomes of a species that survive unchanged.
+        elitism: number of the best genomes of a species that survive unchanged.
         survival_threshold: share of a species that may have offspring.
-        min_species_size: genomes that every species keeps.
-        max_stagnation: generations without improvement after which a species dies.
-        species_elitism: best species that never stagnate.
+        min_species_size: minimum number of genomes of each species.
+        max_stagnation: generations without improvement after which a species dies out.
+        species_elitism: number of the best species that never stagnate.
 
     Raises:
         ConfigError: a value is out of range.
@@ -139,7 +139,7 @@ class EvolutionSettings:
         self._check_together()
 
     def _check_together(self) -> None:
-        """Refuse what only array genomes can do, and bounds that do not hold the first mutation power."""
+        """Refuse settings that only array genomes support, and bounds that exclude the initial mutation power."""
         for name, stock in STOCK.items():
             came = getattr(self, name)
             if self.genome == "stock" and came != stock:
@@ -178,4 +178,4 @@ RECURRENT = EvolutionSettings(
     min_species_size=20,
     species_elitism=1,
 )
-"""For the grid worlds: recurrent networks without biases, which keep their signals positive at first."""
+"""Settings for the grid worlds: recurrent networks without biases, whose weights are positive at the start."""

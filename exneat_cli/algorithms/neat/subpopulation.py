@@ -1,4 +1,4 @@
-"""One NEAT population with configuration, counters and random state of its own."""
+"""One NEAT population with its own configuration, counters and random state."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from exneat_cli.wiring import Moments
 
 
 class Subpopulation:
-    """What `neat.Population` is, turned inside out: the caller evaluates, this class only evolves.
+    """A counterpart of `neat.Population` that only evolves; the caller evaluates.
 
-    Neither subpopulations nor threads disturb one another: each subpopulation draws from generators of its own.
+    Subpopulations and threads do not affect one another: each subpopulation draws from its own generators.
 
     Args:
-        config: from `neat_config`, for this subpopulation alone.
-        seed: of its random numbers.
+        config: from `neat_config`, for this subpopulation only.
+        seed: seed of its random numbers.
 
     Attributes:
-        genomes: the current generation by id, in neat-python's order; of the configuration's class.
+        genomes: the current generation by id, in neat-python's order; instances of the configuration's class.
     """
 
     def __init__(self, config: neat.Config, seed: SeedSequence) -> None:
@@ -73,18 +73,18 @@ class Subpopulation:
 
     @property
     def first_parents(self) -> dict[int, int]:
-        """Of each of the last generation's offspring, by id, the id of the first parent."""
+        """Ids of the last generation's offspring -> ids of their first parents."""
         return self._reproduction.first_parents
 
     def in_arrays(self, key: int) -> ArrayGenome:
-        """The genome with this id, whatever the configuration's class is."""
+        """The genome with this id, converted to arrays if necessary."""
         genome: ArrayGenome = self.genomes[key] if self._in_arrays else from_stock(self.genomes[key])
         return genome
 
     def advance(self, fitness: Mapping[int, float], sensed: Moments | None = None) -> bool:
-        """Replace the generation, by the fitness of each genome's id; returns whether all species had died out.
+        """Replace the generation, based on the fitness of each genome, by id; returns whether all species had died out.
 
-        Mutations are safe for what was `sensed` at the pins, see `EvolutionSettings`; None takes all alike.
+        Safe mutations are scaled by the values `sensed` at the pins, see `EvolutionSettings`; None scales none.
         """
         if sensed is not None:
             root_mean_square = np.sqrt(sensed.means**2 + sensed.squares / np.maximum(sensed.counts, 1.0))
@@ -104,7 +104,7 @@ class Subpopulation:
         return extinct
 
     def state(self, prefix: str) -> State:
-        """All that it depends on; the names of columns begin with `prefix`. Taking it changes nothing."""
+        """Everything on which it depends; the names of columns begin with `prefix`. Has no side effects."""
         version, words, next_gauss = self._chance.getstate()
         generator = self.config.genome_config.generator
         plain = {
@@ -126,10 +126,10 @@ class Subpopulation:
 
     @classmethod
     def restored(cls, config: neat.Config, state: State, prefix: str) -> Subpopulation:
-        """The subpopulation that `state` was taken of, or a file of anyone's, with `config` as new.
+        """The subpopulation in `state`, which may come from an untrusted file; `config` must be a new one.
 
         Raises:
-            AttributeError, KeyError, OverflowError, TypeError, ValueError: the state is none, or does not fit.
+            AttributeError, KeyError, OverflowError, TypeError, ValueError: the state is invalid or does not fit.
         """
         plain, columns = state
         own, items = cls.__new__(cls), config.genome_config
@@ -167,7 +167,7 @@ class Subpopulation:
             raise ValueError("expected every genome in one species")
 
     def _restore_counters(self, plain: Mapping[str, Any], columns: Columns, prefix: str) -> None:
-        """After genomes and species, which they must be ahead of."""
+        """Restore the counters after genomes and species, which they must be ahead of."""
         given = {
             "generation": -1,
             "next_genome": max(self.genomes),
