@@ -1,4 +1,4 @@
-"""The hot room: runs episodes and returns what came out of them; writes nothing."""
+"""Rollouts: runs episodes and returns their outcomes; writes no files. Most of a run's time is spent here."""
 
 from exneat_cli.rollouts.episode import Recording, record
 from exneat_cli.rollouts.runner import Outcomes, Runner, Trace

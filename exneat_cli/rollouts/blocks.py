@@ -1,4 +1,4 @@
-"""Work for worker processes: how it is cut into blocks, and what a worker does with one."""
+"""Work for worker processes: how it is divided into blocks, and how a worker runs one."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from exneat_cli.rollouts.settings import Noise
 from exneat_cli.tasks import Simulation, Task
 
 Setup = tuple[Task, Noise, bool]
-"""What worlds are opened for: a task, its noise, and whether this is training."""
+"""The setup of a world: a task, its noise, and whether this is training."""
 WORTH_SECONDS = 0.05
-"""A block takes at least this long, where there is so much to do: sending it costs 3 to 5 ms."""
+"""Minimum duration of a block (s), if there is enough work: sending one costs 3 to 5 ms."""
 BLOCKS_PER_WORKER = 8
-"""So many blocks let workers end together."""
+"""Number of blocks per worker, so that workers finish at about the same time."""
 
 
 def blocks(brains: int, episodes: int, workers: int, smallest: int) -> list[tuple[slice, slice]]:
-    """Equal blocks of brains and episodes for the workers: whole rows if possible, so that a brain travels once.
+    """Equal blocks of brains and episodes for the workers: whole rows if possible, so that a brain is sent only once.
 
-    Blocks hold at least `smallest` runs of a brain through an episode, if there is work for all.
+    Blocks hold at least `smallest` pairs of a brain and an episode, if there is work for all workers.
     """
     runs = brains * episodes
     wanted = min(runs, max(workers, min(BLOCKS_PER_WORKER * workers, runs // smallest)))
@@ -43,25 +43,25 @@ def _slices(count: int, parts: int) -> list[slice]:
 
 
 def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tally, float]:
-    """Run some brains through some episodes, in a worker; returns what came out, and how many seconds it took.
+    """Run some brains through some episodes, in a worker; returns their tally and the time that it took (s).
 
-    Pickled are in `world` where the process that asks looks for modules, and pickled `Setup`; in `work` `Acting`,
-    episodes, and whether statistics of what is sensed are wanted.
+    `world` holds, pickled, the requesting process's module search path and the pickled `Setup`; `work` holds `Acting`,
+    episodes, and whether statistics of the sensed values are wanted.
 
     Raises:
-        ExneatError: a version differs from what is `expected`, that of the process that asks.
+        ExneatError: a version differs from the `expected` one, that of the requesting process.
     """
     for name, wanted in expected.items():
         if (came := versions()[name]) != wanted:
             fix = "install the same on all machines and start the workers again"
             raise ExneatError(f"executor=dask: expected workers with {name} {wanted}, got {came}\n  {fix}")
     path, setup = pickle.loads(world)
-    sys.path.extend(place for place in path if place not in sys.path)  # a user's task may lie anywhere
+    sys.path.extend(place for place in path if place not in sys.path)  # a user's task may be anywhere
     (task, noise, training), (acting, episodes, moments) = pickle.loads(setup), pickle.loads(work)
     idle = _idle_worlds(world)
     try:
         own = idle.pop()
-    except IndexError:  # no test before: another thread may take the last one in between
+    except IndexError:  # not tested beforehand, since another thread may take the last one in between
         own = open_world(task, noise, training=training)
     brains, began = len(acting[0].size), time.perf_counter()
     tally = empty_tally(task, brains, len(episodes), moments=moments)
@@ -71,15 +71,15 @@ def run_block(expected: dict[str, str], world: bytes, work: bytes) -> tuple[Tall
     return tally, time.perf_counter() - began
 
 
-@functools.lru_cache(4)  # a robustness sweep has another one at every level
+@functools.lru_cache(4)  # a robustness sweep has a new setup at every level
 def _idle_worlds(world: bytes) -> list[Simulation]:
-    """Opened worlds of this worker that nobody uses; take from and give back to it."""
+    """Open worlds of this worker that are not in use; callers take them from this list and return them to it."""
     return []
 
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What must be the same here and in every worker, or results could differ."""
+    """Versions that must be the same here and in every worker, or results could differ."""
     return {
         "exneat": f"{exneat_cli.__version__} with sources {source_digest()[:8]}",
         "Python": ".".join(platform.python_version_tuple()[:2]),

@@ -1,7 +1,7 @@
-"""Runs episodes in the worker processes of dask clusters: one on this machine, started for it, or one at an address.
+"""Runs episodes in the workers of a dask cluster: one started on this machine, or an existing one at an address.
 
-Work is done again when the worker that had it dies, and results are put where they belong, so that neither
-deaths nor the order of things show in them. dask is imported when the first cluster is opened, never before.
+Work is repeated when its worker dies, and results are stored by position, so that they depend neither on deaths of
+workers nor on the order of completion. dask is only imported when the first cluster is opened.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from exneat_cli.rollouts.settings import Executor
 from exneat_cli.seeding import EpisodeSeeds
 
 PATIENCE_SECONDS = 60.0
-"""How long a cluster may be without any worker."""
+"""How long a cluster may be without workers (s)."""
 CONNECT_SECONDS = 8
-"""How long to wait for the scheduler at an address."""
+"""How long to wait for the scheduler at an address (s)."""
 
 
 class Cluster:
-    """A connection to a scheduler, and the workers that were started for it, which `close` ends with their files."""
+    """A connection to a scheduler, and any workers started for it, which `close` ends, removing their files."""
 
     def __init__(self, executor: Executor) -> None:
         executor.check_installed()
@@ -45,7 +45,7 @@ class Cluster:
         address, self._own = executor.address, None
         self._name = f"the scheduler at {address}" if address else "the cluster on this machine"
         with contextlib.ExitStack() as ending:
-            # What goes wrong is said by us, once; dask would add pages.
+            # Errors are reported by us, once; dask would print pages of them.
             ending.enter_context(silence_logging_cmgr(logging.CRITICAL))
             ending.enter_context(dask.config.set({"distributed.admin.large-graph-warning-threshold": "1GB"}))
             if address is None:
@@ -61,15 +61,15 @@ class Cluster:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the scheduler is still there."""
+        """Whether the scheduler is still connected."""
         return bool(self.client.status == "running")
 
     def run(self, setup: Setup, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
-        """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
+        """Run every brain through every episode of the setup; write `tally`.
 
         Raises:
-            ExneatError: no worker was there for `PATIENCE_SECONDS`, brains killed one worker after the other, or
-                a worker has other versions.
+            ExneatError: there were no workers for `PATIENCE_SECONDS`, several workers in a row died over the same
+                brains, or a worker has other versions.
         """
         from distributed import KilledWorker
         from distributed.protocol.pickle import dumps
@@ -81,8 +81,8 @@ class Cluster:
         pool = self.client.get_executor(pure=False)
         try:
             for some, which in blocks(len(brains.size), len(episodes), workers, max(1, smallest)):
-                # dask's own pickling, but in one piece: arrays that travel on their own arrive read-only, for which
-                # numba would compile everything anew.
+                # dask's own pickling, but in one piece: arrays sent separately arrive read-only, and numba would
+                # compile everything again for them.
                 work = dumps(((brains.part(some.start, some.stop), *added), list(episodes[which]), moments))
                 waiting[pool.submit(run_block, versions(), world, work)] = which, some
             self._gather(waiting, tally)
@@ -93,10 +93,10 @@ class Cluster:
             raise ExneatError("executor=dask: gave up: one worker after the other died over the same brains") from error
         finally:
             if self.client.status == "running":
-                pool.shutdown(wait=False)  # what waits is not begun; what is being run ends by itself
+                pool.shutdown(wait=False)  # waiting work is not started; running work finishes on its own
 
     def _gather(self, waiting: dict[Future[tuple[Tally, float]], tuple[slice, slice]], tally: Tally) -> None:
-        """Write what comes back to its place, (episodes, brains), and see that there are workers meanwhile."""
+        """Write results to their places, (episodes, brains), and check meanwhile that there are workers."""
         pace, workers_seen = math.inf, time.monotonic()
         while waiting:
             done, _ = wait(waiting, timeout=1.0, return_when=FIRST_COMPLETED)
@@ -107,28 +107,28 @@ class Cluster:
                 part, seconds = future.result()
                 for own, values in zip(tally, part, strict=True):
                     own[place] = values
-                pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
+                pace = min(pace, seconds / part[0].size)  # longer ones also loaded compiled code
             if done or self._threads():
                 workers_seen = time.monotonic()
             elif time.monotonic() - workers_seen > PATIENCE_SECONDS:
                 fix = "\n  start some: dask worker <address> --nworkers auto --nthreads 1" if self._own is None else ""
                 raise ExneatError(f"executor=dask: {self._name} had no workers for {PATIENCE_SECONDS:.0f} s{fix}")
             if self._own is not None and not done:
-                self._own.scale(self._executor.threads)  # starts those again that dask had given up
+                self._own.scale(self._executor.threads)  # restarts workers that dask has given up
         self._seconds_per_run = pace
 
     def _threads(self) -> int:
-        """How many threads all workers have together, now; 0 also if the scheduler cannot be asked."""
+        """Current number of threads of all workers together; 0 also if the scheduler cannot be asked."""
         try:
             return sum(self.client.nthreads().values())
-        except (OSError, AttributeError, asyncio.CancelledError):  # it went away just now
+        except (OSError, AttributeError, asyncio.CancelledError):  # it has just gone away
             return 0
 
     def _started(self, ending: contextlib.ExitStack) -> Any:
-        """A scheduler and workers on this machine; no worker is waited for."""
+        """A scheduler and workers on this machine; does not wait for the workers."""
         from distributed import LocalCluster
 
-        # dask would leave its own directory for such files where it is.
+        # dask would leave its own directory for such files behind.
         scratch = str(ending.enter_context(scratch_directory()))
         cluster: Any = LocalCluster(
             n_workers=0,
@@ -136,7 +136,7 @@ class Cluster:
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
-            # The scheduler listens there without a dashboard too.
+            # The scheduler listens at this address even without a dashboard.
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0", "local_directory": scratch},
             memory_limit=0,
             local_directory=scratch,
@@ -152,12 +152,12 @@ class Cluster:
 
 
 async def _ignore_interrupts() -> None:
-    """Children inherit what this thread blocks: Ctrl-C reaches them too, but is ours to answer."""
+    """Children inherit the signals that this thread blocks: Ctrl-C also reaches them, but only we handle it."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 async def _stop_workers(cluster: Any) -> None:
-    """End the workers; those in the midst of episodes after a second, since they have nothing to save."""
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it would tell of futures that nobody waits for any more
+    """End the workers; busy ones are killed after a second, since they have nothing to save."""
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # it would report futures that are no longer awaited
     stopping = [nanny.close(timeout=1.0) for nanny in cluster.workers.values()]
     await asyncio.gather(*stopping, return_exceptions=True)

@@ -1,4 +1,4 @@
-"""The one loop that every episode of every task and brain runs in.
+"""The one loop in which every episode of every task and brain runs.
 
 A step is: observe -> sensor noise and clipping -> sense -> brain -> action noise -> drive -> step.
 """
@@ -21,19 +21,19 @@ from exneat_cli.seeding import EpisodeSeeds, generator
 from exneat_cli.tasks import RUNNING, HasInitialPose, HasPicture, Simulation, Task
 
 Acting = tuple[Brains, NDArray[np.float64], NDArray[np.float64]]
-"""Brains, and low and span, (A,) each: low + U(0, span) is added to their actions."""
+"""Brains, low and span, the latter two (A,): low + U(0, span) is added to the brains' actions."""
 Share = tuple[int, int, int]
-"""An episode, the first brain that runs through it, and the one before which to stop."""
+"""Index of an episode, index of the first brain to run through it, and one past that of the last."""
 Tally = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-"""What the loop writes for B brains in E episodes.
+"""The results that the loop writes for B brains in E episodes.
 
-How each ended, ``ENDED`` or ``FAILED``, and its control steps, (E, B); sums of the reward terms, (E, B, terms); means
-of what was sensed, and sums of squared deviations from them, (E, B, sensed), or (E, B, 0) where nobody asked.
+Status, ``ENDED`` or ``FAILED``, and number of control steps, (E, B); sums of the reward terms, (E, B, terms); means of
+the sensed values, and sums of squared deviations from them, (E, B, sensed), or (E, B, 0) if they are not wanted.
 """
 
 
 def empty_tally(task: Task, brains: int, episodes: int, *, moments: bool) -> Tally:
-    """Room for all of it, 0 everywhere."""
+    """A tally of zeros."""
     shape, sensed = (episodes, brains), task.sensed_size if moments else 0
     statuses, steps = np.zeros((2, *shape), np.int64)
     means, squares = np.zeros((2, *shape, sensed))
@@ -46,8 +46,8 @@ def _episodes(  # type: ignore[no-untyped-def]
     """Draw one world and run the brains from `first` to before `last` through it, each from its start.
 
     The names reset, rewind, observe, sense, drive, step and locate are bound by `_loop_of`; `disturbance` and `buffers`
-    are described in `run_shares` and `_buffers`. Another thread sets `halt`, (1,), to stop. `tally` is that of one
-    episode. `trace`, (steps + 1, located + terms), gets the path of the last brain; rows that it lacks are left out.
+    are described in `run_shares` and `_buffers`. Another thread sets `halt`, (1,), to stop the loop. `tally` is that of
+    one episode. `trace`, (steps + 1, located + terms), gets the path of the last brain, as far as it has rows.
     """
     memory, readings, sensed, action, terms, sensor_noise, action_noise = buffers
     statuses, steps, totals, means, squares = tally
@@ -72,7 +72,7 @@ def _episodes(  # type: ignore[no-untyped-def]
                 break
             if halt[0]:
                 return
-            # Noise is drawn when the first brain needs it and kept for the others: all of them face the same.
+            # Noise is drawn when the first brain needs it and kept for the others, so that it is the same for all.
             if t == drawn:
                 _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise, t)
                 drawn += 1
@@ -94,7 +94,7 @@ def _episodes(  # type: ignore[no-untyped-def]
 
 @compiled_lean
 def _draw_noise(sensor_rng, action_rng, disturbance, sensor_noise, action_noise, t):  # type: ignore[no-untyped-def]
-    """Draw the noise of step t on the readings and on the action, in their order."""
+    """Draw the noise of step t on the readings, then on the action."""
     sensor_std, _, _, action_low, action_span = disturbance
     for i in range(sensor_noise.shape[1]):
         sensor_noise[t, i] = sensor_rng.normal(0.0, sensor_std)
@@ -115,7 +115,7 @@ def _disturb(readings, noise, t, disturbance):  # type: ignore[no-untyped-def]
 
 @compiled_lean
 def _add_moments(sensed, t, means, squares):  # type: ignore[no-untyped-def]
-    """Count in what is sensed at step t; `means` and `squares` are empty where nobody asked for them.
+    """Update the moments with the values sensed at step t; `means` and `squares` are empty if they are not wanted.
 
     Source: Welford, "Note on a method for calculating corrected sums of squares and products", 1962.
     """
@@ -127,13 +127,13 @@ def _add_moments(sensed, t, means, squares):  # type: ignore[no-untyped-def]
 
 @compiled_lean
 def _unchanged(world, *values):  # type: ignore[no-untyped-def]
-    """Leave the readings, which lie where what is sensed does, or the action as they are, or locate nothing."""
+    """Do nothing: in place of `sense` (readings and sensed values are then one array), `drive` or `locate`."""
 
 
 def _loop_of(simulation: Simulation, task: str) -> Callable[..., Any]:
-    """The loop for one kind of world, whose task has this name: compiled if the world is, else plain Python."""
+    """The loop for one kind of world, whose task has this name: compiled if its functions are, else plain Python."""
     names = ("reset", "rewind", "observe", "sense", "drive", "step", "locate")
-    # The world of plain functions may be something that compiled code cannot take.
+    # The world of plain Python functions may be an object that compiled code cannot handle.
     default = _unchanged if simulation.compiled else _unchanged.py_func  # type: ignore[attr-defined]
     functions = {name: getattr(simulation, name) or default for name in names}
     return _compiled_loop(task, **functions) if simulation.compiled else with_functions(_episodes, task, **functions)
@@ -141,16 +141,16 @@ def _loop_of(simulation: Simulation, task: str) -> Callable[..., Any]:
 
 @functools.cache
 def _compiled_loop(task: str, **functions: Callable[..., Any]) -> Callable[..., Any]:
-    # Worlds of one task may bind other functions, such as none to sense; the cache tells loops apart by name alone.
+    # Worlds of one task may have different functions, or none for `sense`; the cache tells loops apart only by name.
     name = "_".join(("episodes_of", task, *(function.__name__ for function in functions.values())))
     return compiled_lean(with_functions(_episodes, name, **functions))
 
 
 def open_world(task: Task, noise: Noise, *, training: bool) -> Simulation:
-    """Open a world of a task, under this noise on its initial pose if it has one.
+    """Open a world of a task, with this noise on its initial pose, if it has one.
 
     Raises:
-        ValueError: the world has no `sense`, but its task says that brains sense something else than the readings.
+        ValueError: the world has no `sense`, but its task has another number of sensed values than of readings.
     """
     if isinstance(task, HasInitialPose) and noise.reset_scale is not None:
         simulation = task.open_disturbed(training=training, reset_scale=noise.reset_scale)
@@ -173,14 +173,14 @@ def run_shares(
     tally: Tally,
     trace: NDArray[np.float64] | None = None,
 ) -> None:
-    """Run brains through episodes of a world that was opened for this task and noise.
+    """Run brains through episodes in a world that was opened for this task and noise.
 
-    `shares` say which, and are taken one by one; `episodes` are those that they count. In the `tally` of all of them,
-    what belongs to `shares` is overwritten. Another thread sets `halt`, (1,), to stop. `trace`, (steps + 1, columns),
-    is to record the path of the last one, see `Trace`.
+    `shares` say which, as indices of brains and `episodes`, and are taken one by one; their entries of `tally` are
+    overwritten. Another thread sets `halt`, (1,), to stop. `trace`, (steps + 1, columns), gets the path of the last
+    brain, see `Trace`.
     """
     brains, action_low, action_span = acting
-    # Sd of the sensor noise, the lowest and the highest noisy reading, and `Acting` on the action.
+    # Sd of the sensor noise, lower and upper limit of noisy readings, and low and span of the action, see `Acting`.
     disturbance = (float(noise.sensor_std), *map(float, task.observation_limits), action_low, action_span)
     noisy = noise.sensor_std > 0.0, bool(action_low.any() or action_span.any())
     buffers = _buffers(task, simulation, brains, *noisy)
@@ -197,10 +197,10 @@ class Recording(NamedTuple):
     """One episode of one brain, step by step.
 
     Attributes:
-        snapshots: what the world was when the brain sensed it, see `exneat_cli.tasks.HasPicture`, at step 0 and at
-            every so many steps from there; where steps have no duration also after the last one.
+        snapshots: the world as the brain sensed it, see `exneat_cli.tasks.HasPicture`, at step 0 and every `every`
+            steps after that; if steps have no duration, also after the last step.
         values: (T, memory) the brain's value vector after each step.
-        trace: (T + 1, columns) as of `exneat_cli.rollouts.Trace`.
+        trace: (T + 1, columns), see `exneat_cli.rollouts.Trace`.
     """
 
     snapshots: list[Any]
@@ -209,7 +209,7 @@ class Recording(NamedTuple):
 
 
 def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, steps: int, every: int = 1) -> Recording:
-    """Run an episode, of at most so many steps, in the same loop as all others, but step by step in plain Python."""
+    """Run an episode of at most `steps` steps in the same loop as all others, but in plain Python."""
     assert isinstance(task, Task)
     simulation, halt = open_world(task, noise, training=False), np.zeros(1, np.bool_)
     ties = np.full(len(task.actuator_names), task.tie_noise)
@@ -237,7 +237,7 @@ def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, s
     trace = np.zeros((task.longest_episode + 1, located + len(task.terms)))
     with uninterrupted():
         loop(simulation.world, brain, 0, 1, *map(generator, seeds), disturbance, buffers, halt, tally, trace, located)
-    if task.step_seconds is None:  # the last step is what ends such an episode: a goal reached, the last prey caught
+    if task.step_seconds is None:  # show how such an episode ends: the goal is reached, or the last prey caught
         snapshots.append(task.snapshot(simulation.world))
     return Recording(snapshots, np.array(values), trace[: len(values) + 1].copy())
 
@@ -245,17 +245,17 @@ def record(task: HasPicture, noise: Noise, brain: Brains, seeds: EpisodeSeeds, s
 def _buffers(
     task: Task, simulation: Simulation, brains: Brains, noisy_readings: bool, noisy_action: bool
 ) -> tuple[NDArray[np.float64], ...]:
-    """What the loop writes into, nothing of which outlives a call: noise has no columns where there is none."""
+    """Arrays that the loop overwrites, valid during one call; noise arrays have no columns if there is no noise."""
     memory, steps = np.zeros(memory_size(brains)), task.longest_episode
     inputs, actions = task.observation_size, len(task.actuator_names)
     sensed = memory[: task.sensed_size]
     return (
         memory,  # values of the largest brain and a scratch entry for each of its nodes
-        # (inputs,) readings: without a `sense` they need no copying, since they are what is sensed.
+        # (inputs,) readings: without a `sense` they are the sensed values, and are not copied.
         sensed if simulation.sense is None else np.zeros(inputs),
         sensed,
         np.zeros(actions),
         np.zeros(len(task.terms)),
         np.zeros((steps, inputs if noisy_readings else 0)),  # noise of the sensors
-        np.zeros((steps, actions if noisy_action else 0)),  # of the action
+        np.zeros((steps, actions if noisy_action else 0)),  # noise on the action
     )

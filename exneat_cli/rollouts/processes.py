@@ -1,7 +1,7 @@
-"""Runs episodes in worker processes on this machine, by Python's own means.
+"""Runs episodes in worker processes on this machine, with Python's own `multiprocessing`.
 
-Work is done again when the worker that had it dies, and results are put where they belong, so that neither deaths nor
-the order of things show in them. A worker ends when it is told to, and with the process that started it.
+Work is repeated when its worker dies, and results are stored by position, so that they depend neither on deaths of
+workers nor on the order of completion. A worker ends when it is told to, or with the process that started it.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from exneat_cli.rollouts.settings import Executor
 from exneat_cli.seeding import EpisodeSeeds
 
 MOST_DEATHS = 3
-"""So many workers may die over the same block of work."""
-_CONTEXT = multiprocessing.get_context("spawn")  # a fork would copy locks that other threads hold
+"""Number of workers that may die over the same block before the work is given up."""
+_CONTEXT = multiprocessing.get_context("spawn")  # forking would copy locks held by other threads
 
 
 class Processes:
@@ -45,11 +45,11 @@ class Processes:
         self._lock = threading.Lock()
 
     def run(self, setup: Setup, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
-        """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
+        """Run every brain through every episode of the setup; write `tally`.
 
         Raises:
-            ExneatError: workers cannot be started or cannot import the task, or one after the other died over the same
-                brains.
+            ExneatError: workers cannot be started or cannot import the task, or several workers in a row died over the
+                same brains.
         """
         (brains, *added), moments = acting, bool(tally[-1].size)
         smallest = math.ceil(WORTH_SECONDS / self._seconds_per_run)
@@ -64,17 +64,17 @@ class Processes:
                     some, which = places[block]
                     for own, values in zip(tally, part, strict=True):
                         own[which, some] = values
-                    pace = min(pace, seconds / part[0].size)  # the longer ones loaded compiled code
+                    pace = min(pace, seconds / part[0].size)  # longer ones also loaded compiled code
                 self._seconds_per_run = pace
             except BaseException as error:
-                self.close()  # nobody waits for what the others are doing
+                self.close()  # the results of the other workers are not needed any more
                 if isinstance(error, ImportError):
                     why = f"a worker cannot import what it needs: {error}\n  executor=serial needs no worker"
                     raise ExneatError(f"executor=processes: {why}") from error
                 raise
 
     def _results(self, world: bytes, work: Sequence[bytes]) -> Iterator[tuple[int, tuple[Tally, float]]]:
-        """Have all of `work` done; yields what comes back, with the number of the block that it belongs to."""
+        """Have all of `work` done; yields the number of each block with its result."""
         waiting, busy, deaths = deque(range(len(work))), dict[_Worker, int](), Counter[int]()
         while waiting or busy:
             self._start(min(self._executor.threads, len(waiting) + len(busy)))
@@ -96,12 +96,12 @@ class Processes:
                         raise ExneatError(f"executor=processes: {why}\n  resume=true goes on") from None
 
     def _start(self, count: int) -> None:
-        """See that there are so many workers."""
+        """Make sure that there are at least `count` workers."""
         if len(self._workers) >= count:
             return
         resource_tracker.ensure_running()  # its first start would undo what follows
         with uninterrupted():
-            # Children inherit what this thread blocks: Ctrl-C reaches them too, but is ours to answer.
+            # Children inherit the signals that this thread blocks: Ctrl-C also reaches them, but only we handle it.
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 while len(self._workers) < count:
@@ -112,7 +112,7 @@ class Processes:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def close(self) -> None:
-        """End all workers, also those in the midst of episodes: they have nothing to save."""
+        """End all workers, even busy ones: they have nothing to save."""
         while self._workers:
             self._workers.pop().end()
 
@@ -126,15 +126,15 @@ class _Worker:
         try:
             self._process.start()
         finally:
-            theirs.close()  # once the process is dead nobody has it any more, which ends the connection
+            theirs.close()  # so that the death of the process ends the connection
 
     def begin(self, world: bytes, work: bytes) -> None:
         """Have the worker run a block, see `run_block`."""
-        with contextlib.suppress(OSError):  # it is dead, as `result` will tell
+        with contextlib.suppress(OSError):  # it is dead, as `result` will report
             self.connection.send((world, work))
 
     def result(self) -> tuple[Tally, float]:
-        """What came of the block, or the error that was raised.
+        """The result of the block; raises the error that the worker raised.
 
         Raises:
             EOFError: the worker is dead.
@@ -148,14 +148,14 @@ class _Worker:
         return result  # type: ignore[no-any-return]
 
     def end(self) -> None:
-        """Kill it."""
+        """Kill the process."""
         self._process.kill()
         self._process.join()
         self.connection.close()
 
 
 def _serve(connection: Connection) -> None:
-    """Do what a worker is there for, until the other side is gone."""
+    """Run blocks in a worker until the other side is gone."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with forgiving_output(), contextlib.suppress(EOFError, OSError):
         while True:
@@ -176,10 +176,10 @@ def _end_with_parent() -> None:
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or one that says the same where it cannot travel, with where it was raised."""
+    """The error, or one with the same message if it cannot be pickled, with a note of where it was raised."""
     try:
         pickle.loads(pickle.dumps(error))
-    except Exception:  # whatever an error of any code does when it is pickled
+    except Exception:  # pickling a foreign error may raise anything
         error = RuntimeError(f"{type(error).__name__}: {error}")
     error.add_note(f"in a worker process:\n{traceback.format_exc()}")
     return error

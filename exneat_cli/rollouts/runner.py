@@ -1,7 +1,7 @@
-"""Runs brains through episodes, wherever the executor says.
+"""Runs brains through episodes on the chosen executor.
 
-Every episode draws from generators of its own, and a world is as new for each brain, so results depend neither on
-the number of workers nor on which of them ran what.
+Every episode draws from its own generators, and every brain gets a fresh world, so results depend neither on the
+number of workers nor on how the work is divided among them.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from exneat_cli.wiring import Moments, merged
 
 Actors = Brains | Sequence[Brains] | None
 Trace = tuple[NDArray[np.float64], NDArray[np.float64] | None]
-"""One episode: (steps + 1, columns) step by step, and the tiles of a grid world at its end, see `HasTiles`.
+"""One episode: its path, (steps + 1, columns), and the tiles of a grid world at its end, see `HasTiles`.
 
-Row t holds where the agent is after t steps (`Task.trace_columns`), then the reward terms of step t (`Task.terms`; 0 in
-the first row).
+Row t holds the agent's location after t steps (`Task.trace_columns`), then the reward terms of step t (`Task.terms`; 0
+in the first row).
 """
 
 SHARES_AHEAD = 4
-"""A thread takes this part of its fair share of what is left."""
+"""A thread takes its fair share of the remaining work, divided by this."""
 LONGEST_CALL = 0.25
-"""Seconds that a call of compiled code in the main thread should not exceed: signals wait for its end."""
+"""Desired maximum duration of a compiled call in the main thread (s): signals wait until it ends."""
 
 
 class Outcomes(NamedTuple):
-    """What B brains got in E episodes.
+    """The outcomes of B brains in E episodes.
 
     Attributes:
-        fitness: (B, E) the task's fitness; its failure floor where an episode failed.
-        full_reward: (B, E) the task's second figure, else the fitness; the failure floor likewise.
-        steps: (B, E) control steps done.
-        failed: (B, E) whether physics or network exploded.
-        moments: (B, sensed) of what each brain sensed at all steps of its episodes, but for those that failed; None
-            unless they were asked for.
+        fitness: (B, E) the task's fitness; its failure floor for failed episodes.
+        full_reward: (B, E) the full reward if the task has one, else the fitness; likewise with the failure floor.
+        steps: (B, E) number of control steps.
+        failed: (B, E) whether the simulation became unstable or a value was not finite.
+        moments: (B, sensed) moments of the values that each brain sensed in its episodes, except failed ones; None
+            unless they are wanted.
     """
 
     fitness: NDArray[np.float64]
@@ -60,13 +60,14 @@ class Outcomes(NamedTuple):
 
 
 class Runner:
-    """Episodes of one task under one noise; a context manager that ends its threads or processes.
+    """Runs episodes of one task with one noise; a context manager that ends its threads or processes.
 
     Args:
-        task: what is simulated.
-        noise: what disturbs the agent.
-        executor: where; one world is opened for each thread. Of ``warp``, for training alone, else on all cores.
-        training: switches on the task's early stopping.
+        task: the task that is simulated.
+        noise: noise on sensors and on the initial pose.
+        executor: where episodes run; one world is opened for each thread. ``warp`` is used only in training, and
+            replaced by threads on all cores otherwise.
+        training: whether to enable features of training, such as early stopping.
 
     Raises:
         ExneatError: the executor's cluster cannot be reached, or its library is not installed.
@@ -74,16 +75,16 @@ class Runner:
 
     def __init__(self, task: Task, noise: Noise, executor: Executor, *, training: bool) -> None:
         if executor.name == "warp" and not training:
-            executor = Executor()  # figures that count are those of double precision
+            executor = Executor()  # results are only reported in double precision
         self._task, self._noise, self._executor, self._training = task, noise, executor, training
         self._halt = np.zeros(1, dtype=np.bool_)
         self._run = functools.partial(run_shares, task, noise, self._halt)
         threads = executor.threads if executor.name == "threads" else 1
         self._worlds = [open_world(task, noise, training=training) for _ in range(threads)]
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="episodes")  # starts none before it has work
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="episodes")  # starts no threads before it has work
         with contextlib.ExitStack() as ending:
             ending.callback(self._pool.shutdown, cancel_futures=True)
-            ending.callback(self._halt.fill, True)  # threads end before the next step of their episodes
+            ending.callback(self._halt.fill, True)  # threads stop before the next step of their episodes
             if executor.name in ("processes", "dask", "warp"):
                 ending.enter_context(keep_workers())
                 workers_of(executor)
@@ -96,15 +97,15 @@ class Runner:
         self._ending.close()
 
     def run(self, brains: Actors, episodes: Sequence[EpisodeSeeds], *, moments: bool = False) -> Outcomes:
-        """Outcomes of every brain (one, if it acts at random) in every episode.
+        """Outcomes of every brain (or of one agent that acts at random) in every episode.
 
         Args:
-            brains: who acts; None for actions at random, uniform between the task's bounds.
-            episodes: the same for all of them.
-            moments: whether statistics of what each brain senses are wanted, see `Outcomes`.
+            brains: the brains; None for random actions, uniform between the task's bounds.
+            episodes: the same ones for all brains.
+            moments: whether statistics of the sensed values are wanted, see `Outcomes`.
 
         Raises:
-            ValueError: there is no brain, or one was wired for other sizes of what is sensed or of the action.
+            ValueError: there is no brain, or one has another number of sensed values or actuators than the task.
             ExneatError: the executor has no workers left, or its cluster cannot be used.
         """
         acting = self._acting(brains)
@@ -119,7 +120,7 @@ class Runner:
         return _outcomes(self._task, tally)
 
     def trace(self, brain: Brains | None, seeds: EpisodeSeeds) -> Trace:
-        """The path of one episode, and the world that it went through; always runs in this process."""
+        """The path of one episode, and the tiles of its world; always runs in this process."""
         acting = self._acting(brain)
         tally = empty_tally(self._task, 1, 1, moments=False)
         path = np.zeros((self._task.longest_episode + 1, len(self._task.trace_columns) + len(self._task.terms)))
@@ -128,22 +129,22 @@ class Runner:
         return path[: steps + 1].copy(), self._task.tiles(world) if isinstance(self._task, HasTiles) else None
 
     def _run_on_threads(self, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
-        """A thread per world: the compiled loop holds no GIL, so they run side by side."""
-        # Threads may share the iterator of a list, which takes a step without letting go of the GIL; no generator.
+        """Run one thread per world: the compiled loop releases the GIL, so they run in parallel."""
+        # Threads may share a list iterator, which does not release the GIL during a step, but not a generator.
         shares = iter(list(shares_for_threads(len(acting[0].size), len(episodes), len(self._worlds))))
 
         def work(world: Simulation) -> None:
             try:
                 self._run(world, shares, acting, episodes, tally)
             except BaseException:
-                deque(shares, maxlen=0)  # nothing is left for the other threads
+                deque(shares, maxlen=0)  # leaves nothing for the other threads
                 raise
 
         for worker in wait([self._pool.submit(work, world) for world in self._worlds]).done:
             worker.result()
 
     def _acting(self, brains: Actors) -> Acting:
-        """Brains end to end; refuses those that compiled code would let read and write elsewhere."""
+        """Brains end to end; refuses wrong sizes, with which compiled code would read and write out of bounds."""
         task = self._task
         actions = len(task.actuator_names)
         low, high = np.zeros(actions), np.full(actions, task.tie_noise)
@@ -158,9 +159,9 @@ class Runner:
 
 
 def shares_for_threads(brains: int, episodes: int, threads: int) -> Iterator[Share]:
-    """Episode by episode, some brains at a time: large shares spare calls and the drawing of worlds.
+    """Shares for threads, episode by episode: large ones save calls and the drawing of worlds.
 
-    Shares shrink, so that all threads end together (guided self-scheduling; Polychronopoulos and Kuck, 1987).
+    Shares shrink, so that all threads finish together (guided self-scheduling; Polychronopoulos and Kuck, 1987).
     """
     left = brains * episodes
     for episode in range(episodes):
@@ -174,7 +175,7 @@ def shares_for_threads(brains: int, episodes: int, threads: int) -> Iterator[Sha
 
 
 def short_shares(brains: int, episodes: int) -> Iterator[Share]:
-    """The same for the main thread: as large as can be done within `LONGEST_CALL`, by the time the last ones took."""
+    """Shares for the main thread: as large as fits in `LONGEST_CALL`, judged by the time of the last ones."""
     size = 1
     for episode in range(episodes):
         first = 0
@@ -190,7 +191,7 @@ def short_shares(brains: int, episodes: int) -> Iterator[Share]:
 
 
 def _outcomes(task: Task, tally: Tally) -> Outcomes:
-    """What a tally means in a task."""
+    """Outcomes from a tally of a task."""
     statuses, steps, totals, means, squares = tally
     with np.errstate(invalid="ignore"):
         fitness = task.fitness_of(totals).T
@@ -208,8 +209,8 @@ def _outcomes(task: Task, tally: Tally) -> Outcomes:
 def _moments(
     sound: NDArray[np.bool_], steps: NDArray[np.int64], means: NDArray[np.float64], squares: NDArray[np.float64]
 ) -> Moments:
-    """(B, sensed) over the `sound`, (E, B), episodes, merged in their order."""
-    # What is not finite would stay so in the statistics of a whole training.
+    """(B, sensed) moments over the `sound` episodes, (E, B), merged in their order."""
+    # A value that is not finite would spoil the statistics of the whole training.
     sound = (sound & np.isfinite(squares).all(axis=-1))[..., np.newaxis]
     each = (np.where(sound, values, 0.0) for values in (steps[..., np.newaxis], means, squares))
     rows = (np.broadcast_to(values, means.shape).reshape(len(sound), -1) for values in each)

@@ -1,4 +1,4 @@
-"""Settings of episodes: where they run, what disturbs the agent, and sweeps of one setting."""
+"""Settings of episodes: executors, noise, and sweeps of one setting."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from exneat_cli.errors import ConfigError, ExneatError, check_choice, check_real
 from exneat_cli.tasks import HasInitialPose, Task
 
 _GPU_PACKAGES = {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0"}
-"""What `exneat[gpu]` installs: results depend on their versions."""
+"""Packages of `exneat[gpu]`; results depend on their versions."""
 EXECUTORS = ("threads", "serial", "processes", "dask", "warp")
 _DEVICE = re.compile(r"cpu|cuda(:\d{1,2})?")
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
@@ -21,17 +21,17 @@ _ADDRESS = re.compile(r"([a-z]+://)?[^\s/:]\S*:\d+")
 
 @dataclass(frozen=True)
 class Executor:
-    """Where episodes run; results do not depend on it.
+    """Where episodes run; results do not depend on it, except with ``warp``, which computes in single precision.
 
     Attributes:
         name: ``threads``, ``serial`` for one thread, ``processes`` for worker processes on this machine, ``dask``
             for those of a cluster, or ``warp`` for training in batches of worlds on a GPU.
-        workers: number of threads, or of processes with one thread each; 0 takes every core this process may
-            use. A cluster at an address has workers of its own: 0 there.
-        address: of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers on
-            this machine.
-        worlds: of ``warp``, how many may be side by side on its device.
-        device: of ``warp``, ``cuda``, ``cuda:0``, ... or ``cpu``; None takes a GPU if there is one.
+        workers: number of threads, or of processes with one thread each; 0 takes every core that this process may
+            use. Must be 0 with `address`, since that cluster has its own workers.
+        address: address of the scheduler of a running dask cluster, e.g. ``tcp://10.0.0.1:8786``; None starts workers
+            on this machine.
+        worlds: for ``warp``, the maximum number of parallel worlds on its device.
+        device: for ``warp``, ``cuda``, ``cuda:0``, ... or ``cpu``; None takes a GPU if there is one.
 
     Raises:
         ConfigError: a value is out of range, or makes no sense with this name.
@@ -71,7 +71,7 @@ class Executor:
         return self.workers or cores
 
     def check_installed(self) -> None:
-        """Refuse to begin without the library that this executor needs.
+        """Refuse an executor whose library or device is missing.
 
         Raises:
             ExneatError: it is not installed or of another version, or there is no such device.
@@ -103,18 +103,18 @@ class Executor:
 
 
 def is_compiled(task: Task) -> bool:
-    """Whether episodes of a task run in compiled code, which threads speed up; plain Python needs processes."""
+    """Whether a task's episodes run in compiled code, which threads speed up; plain Python code needs processes."""
     return task.open(training=False).compiled
 
 
 @dataclass(frozen=True)
 class Noise:
-    """What disturbs the agent.
+    """Noise in episodes.
 
     Attributes:
-        sensor_std: sd of the normal noise on every reading at every step, in the reading's own unit.
+        sensor_std: sd of the normal noise on every reading at every step, in the reading's unit.
         reset_scale: size of the noise on the initial pose, on positions (rad, m) and velocities (rad/s, m/s); None
-            takes the task's own.
+            takes the task's default.
 
     Raises:
         ConfigError: a value is negative or not finite.
@@ -131,16 +131,16 @@ class Noise:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A setting of the task or of the noise, the very ones that training uses, and the levels that it goes through.
+    """One setting of the task or of the noise, as used in training, and the levels at which to test it.
 
     Attributes:
         name: e.g. ``sensor_noise``.
-        parameter: the setting, below ``task.`` or ``noise.``.
+        parameter: the dotted name of the setting, which starts with ``task.`` or ``noise.``.
         levels: its values, all different.
-        label: of its axis in figures.
+        label: label of its axis in figures.
 
     Raises:
-        ConfigError: there are no levels, or one is no finite number or comes twice.
+        ConfigError: there are no levels, or one is not a finite number or occurs twice.
     """
 
     name: str

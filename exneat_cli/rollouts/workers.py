@@ -1,4 +1,4 @@
-"""Worker processes, and batches on a GPU, that stay for the next runner: starting them takes seconds."""
+"""Worker processes and batches on a GPU, kept for the next runner, since starting them takes seconds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _lock = threading.RLock()
 
 @contextlib.contextmanager
 def keep_workers() -> Iterator[None]:
-    """While inside, workers that runners start stay for the next ones; the last to leave ends them."""
+    """Within the block, keep the workers that runners start for later ones; the last block to end ends them."""
     global _users
     with _lock:
         _users += 1
@@ -37,7 +37,7 @@ def keep_workers() -> Iterator[None]:
 
 
 def workers_of(executor: Executor) -> Workers:
-    """The workers of an executor that has some, those there are or new ones; within `keep_workers`.
+    """The workers of an executor that uses any, existing or new ones; to be called within `keep_workers`.
 
     Raises:
         ExneatError: its library is not installed, nothing answers at its address, or there is no such device.

@@ -1,1 +1,1 @@
-"""Episodes of whole populations at once, in batches of worlds on a GPU; imported only when asked for."""
+"""Episodes of whole populations at once, in batches of worlds on a GPU; imported only when needed."""

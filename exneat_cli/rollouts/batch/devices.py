@@ -1,4 +1,4 @@
-"""The devices that Warp finds."""
+"""Devices found by Warp."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from exneat_cli.errors import ExneatError
 
 @functools.cache
 def find_device(name: str | None) -> str:
-    """Warp's name of a device: of ``cuda``, the first one; of None, that or ``cpu``.
+    """Warp's name of a device: ``cuda`` means the first GPU; None means the first GPU, or ``cpu`` if there is none.
 
     Raises:
         ExneatError: there is no such device.
     """
-    wp.config.log_level = wp.LOG_ERROR  # Warp would tell what it found and what it compiles
+    wp.config.log_level = wp.LOG_ERROR  # Warp would print the devices it finds and the modules it compiles
     wp.init()
     there = [device.alias for device in wp.get_devices()]
     wanted = "cuda:0" if name == "cuda" or (name is None and "cuda:0" in there) else name or "cpu"

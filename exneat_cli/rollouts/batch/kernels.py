@@ -1,7 +1,7 @@
-"""Kernels that give jobs to worlds, disturb readings and keep count of episodes.
+"""Kernels that assign jobs to worlds, disturb readings and record episodes.
 
-A job is one brain in one episode. Which world does it has no effect on what comes out: noise depends on the episode,
-the step and the reading alone.
+A job is one brain in one episode. Its outcome does not depend on the world that does it: noise depends only on the
+episode, the step and the reading.
 """
 
 import warp as wp
@@ -21,7 +21,7 @@ _LOW_WORD = wp.constant(wp.uint64(0xFFFFFFFF))
 
 @wp.struct
 class Jobs:
-    """Queued jobs, of which those from head to tail wait: slot, brain, episode and place in the slot's outcomes."""
+    """A queue of jobs, waiting from head to tail: slot, brain, episode and place in the slot's outcomes."""
 
     head: wp.array(dtype=int)
     tail: wp.array(dtype=int)
@@ -30,7 +30,7 @@ class Jobs:
 
 @wp.struct
 class Doing:
-    """What each world does: its slot, its brain in there (-1: none), its episode, its place, and its count so far."""
+    """The job of each world: slot, brain in the slot (-1: none), episode and place, with steps and totals so far."""
 
     slot: wp.array(dtype=int)
     brain: wp.array(dtype=int)
@@ -42,7 +42,7 @@ class Doing:
 
 @wp.struct
 class Outcome:
-    """Of each slot and place, (S, places): status, steps and (S, places, 4) totals; (S,) how many episodes ended."""
+    """For each slot and place, status and steps, (S, places), and totals, (S, places, 4); (S,) ended episodes."""
 
     status: wp.array2d(dtype=int)
     steps: wp.array2d(dtype=int)
@@ -59,7 +59,7 @@ def take_jobs(
     episodes_per_slot: int,
     memory: wp.array2d(dtype=float),
 ):
-    """Give the next job to each world that runs none; a world for which there is none goes to rest in row 0."""
+    """Give the next job to each world without one; if there is none left, the world rests in row 0 of the starts."""
     w = wp.tid()
     begins[w] = -1
     if status[w] == _RUNNING:
@@ -111,7 +111,7 @@ def _philox(key0: wp.uint32, key1: wp.uint32, step: wp.uint32, block: wp.uint32)
 
 @wp.func
 def _normals(first: wp.uint32, second: wp.uint32):
-    """Two independent normal numbers of two random words (Box and Muller, 1958)."""
+    """Two independent normal numbers from two random words (Box and Muller, 1958)."""
     radius = wp.sqrt(-2.0 * wp.log((float(first >> wp.uint32(8)) + 1.0) * wp.static(2.0**-24)))
     angle = wp.static(2.0 * 3.141592653589793 * 2.0**-24) * float(second >> wp.uint32(8))
     return radius * wp.cos(angle), radius * wp.sin(angle)
@@ -139,7 +139,7 @@ def disturb(keys: wp.array2d(dtype=wp.uint32), doing: Doing, sd: float, count: i
 
 @wp.kernel
 def keep_count(status: wp.array(dtype=int), terms: wp.array2d(dtype=float), doing: Doing, outcome: Outcome):
-    """Add what the step gave, and write down the episodes that ended with it."""
+    """Add the reward terms of the step, and record the episodes that ended with it."""
     w = wp.tid()
     if doing.brain[w] < 0:
         return

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 
 class Mirrored:
-    """An array on the current device and its likeness in memory of the host that the device reads by itself.
+    """An array on the current device and its copy in the host's memory, which is pinned for a GPU.
 
-    Writing waits for nothing: copies are queued behind what the device has to do. Who writes an entry anew must know
-    that it was read.
+    Writing does not wait: copies are queued behind the device's other work. Before an entry is written again, the
+    caller must know that it has been read.
 
     Attributes:
-        there: on the device.
-        here: (the same shape) as it will be there.
+        there: the array on the device.
+        here: the copy on the host, as the array will be once all writing is done.
     """
 
     def __init__(self, values: NDArray[Any], dtype: Any = None) -> None:
@@ -27,7 +27,7 @@ class Mirrored:
         self.here: NDArray[Any] = self._source.numpy()
 
     def write(self, row: int, values: NDArray[Any]) -> None:
-        """Set entries from the begin of a row of the first axis on."""
+        """Set entries, starting at a row of the first axis."""
         first = row * self.here[0].size
         self.here.reshape(-1)[first : first + values.size] = values.ravel()
         numbers = self.here.size // self._source.size  # in each of the device's entries, which may be vectors
@@ -35,17 +35,17 @@ class Mirrored:
         wp.copy(self.there, self._source, dest_offset=place, src_offset=place, count=count)
 
     def resized(self, values: NDArray[Any]) -> Mirrored:
-        """Another one of the same kind."""
+        """A new one of the same type, with other values."""
         return Mirrored(values, self.there.dtype)
 
 
 def widened(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """The same with zeros behind it on every axis that is to be longer."""
+    """The values, padded with zeros at the end of every axis that is longer in `shape`."""
     wide = np.zeros(shape, values.dtype)
     wide[tuple(map(slice, values.shape))] = values
     return wide
 
 
 def grown(array: Any, shape: tuple[int, ...]) -> Any:
-    """A larger array on the current device; what is there stays, and zeros are behind it."""
+    """A larger array on the current device, with the same entries, padded with zeros."""
     return wp.array(widened(array.numpy(), shape), dtype=array.dtype)

@@ -1,4 +1,4 @@
-"""Statistics of what networks sense in their episodes, as `exneat_cli.rollouts.episode` gathers them on the CPU."""
+"""Statistics of the sensed values in episodes, as `exneat_cli.rollouts.episode` gathers them on the CPU."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_moments(
     means: wp.array2d(dtype=wp.float64),
     squares: wp.array2d(dtype=wp.float64),
 ):
-    """Count in what is sensed at this step (Welford, 1962); the first step of an episode begins anew."""
+    """Update the moments with this step's sensed values (Welford, 1962); the first step of an episode resets them."""
     w, i = wp.tid()
     if doing.brain[w] < 0:
         return
@@ -47,7 +47,7 @@ def keep_moments(
     kept_means: wp.array3d(dtype=wp.float64),
     kept_squares: wp.array3d(dtype=wp.float64),
 ):
-    """Write down the episodes that ended with this step."""
+    """Record the moments of episodes that ended with this step."""
     w, i = wp.tid()
     if doing.brain[w] < 0 or status[w] == _RUNNING:
         return
@@ -56,23 +56,23 @@ def keep_moments(
 
 
 class Sensing:
-    """Means and sums of squared deviations: (W, sensed) of what runs, (S, places, sensed) of what has ended."""
+    """Means and sums of squared deviations: (W, sensed) of running episodes, (S, places, sensed) of ended ones."""
 
     def __init__(self, worlds: int, slots: int, size: int) -> None:
         self._running = [wp.zeros((worlds, size), dtype=wp.float64) for _ in range(2)]
         self._ended = [wp.zeros((slots, 1, size), dtype=wp.float64) for _ in range(2)]
 
     def add(self, doing: Any, memory: Any) -> None:
-        """Count in a step's senses, which are in front in `memory`."""
+        """Update the moments with a step's sensed values, with which the rows of `memory` begin."""
         wp.launch(add_moments, dim=self._running[0].shape, inputs=[doing, memory, *self._running])
 
     def keep(self, status: Any, doing: Any) -> None:
-        """Write down what has ended with the step."""
+        """Record the moments of episodes that ended with the step."""
         inputs = [status, doing, *self._running, *self._ended]
         wp.launch(keep_moments, dim=self._running[0].shape, inputs=inputs)
 
     def make_room(self, places: int) -> None:
-        """Enlarge what each slot has; what is there stays."""
+        """Enlarge the arrays to `places` per slot, keeping their entries."""
         slots, _, size = self._ended[0].shape
         self._ended = [grown(each, (slots, places, size)) for each in self._ended]
 

@@ -1,7 +1,7 @@
 """Runs episodes in batches of worlds on one device, for all runs of this process together.
 
-One thread owns the device. Requests of one task and noise share a batch: each takes a slot, and worlds take jobs from
-all slots. What comes out depends on neither.
+One thread owns the device. Requests with the same task and noise share a batch: each takes a slot, and worlds take jobs
+from all slots. Results depend neither on slots nor on worlds.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import HasBatch, Task
 
 STEPS_AT_ONCE = 8
-"""Control steps between two looks at what has ended."""
+"""Control steps between checks for ended episodes."""
 GATHERING_SECONDS = 0.02
-"""How long an idle batch waits for requests of other runs before it begins."""
+"""How long an idle batch waits for requests of other runs before it starts (s)."""
 MOST_SLOTS = 1024
 
 Setup = tuple[Task, Noise, bool]
@@ -63,11 +63,11 @@ class Batches:
         self._closing = False
 
     def run(self, setup: Setup, acting: Acting, episodes: Sequence[EpisodeSeeds], tally: Tally) -> None:
-        """Run every brain through every episode of a task, under its noise and in training or not; write `tally`.
+        """Run every brain through every episode of the setup; write `tally`.
 
         Raises:
-            ExneatError: the device has too little memory, or bodies have more contacts than twice the usual room.
-            ConfigError: the model is none that MuJoCo Warp can simulate.
+            ExneatError: the device has too little memory, or contacts exceed twice the usual room.
+            ConfigError: MuJoCo Warp cannot simulate the model.
         """
         request = _Request(setup, acting[0], list(episodes), tally)
         with self._changed:
@@ -86,7 +86,7 @@ class Batches:
             raise request.error
 
     def close(self) -> None:
-        """End the thread, and free what it has on the device."""
+        """End the thread, and free its memory on the device."""
         with self._changed:
             self._closing = True
             self._changed.notify()
@@ -98,7 +98,7 @@ class Batches:
             while self._take_in():
                 for batch in self._batches.values():
                     batch.advance()
-        except BaseException as error:  # whoever waits has to hear of it
+        except BaseException as error:  # all waiting requests must receive the error
             failed = [request for batch in self._batches.values() for request in batch.requests]
             with self._changed:
                 failed += self._waiting
@@ -112,7 +112,7 @@ class Batches:
             self._batches.clear()
 
     def _take_in(self) -> bool:
-        """Hand what waits to its batch, waiting for work if there is none; returns whether to go on."""
+        """Hand waiting requests to their batches, or wait for some if there is no work; returns whether to continue."""
         with self._changed:
             while not (self._closing or self._waiting or any(each.requests for each in self._batches.values())):
                 self._changed.wait()
@@ -130,7 +130,7 @@ class Batches:
 
 
 class _Batch:
-    """The requests of one task and noise, and the worlds that they share."""
+    """The requests with one task and noise, and the worlds that they share."""
 
     def __init__(self, setup: Setup, device: str, most: int, *, moments: bool) -> None:
         self._setup, self._device, self._most, self._room = setup, device, most, 1
@@ -141,7 +141,7 @@ class _Batch:
         self.requests: list[_Request] = []
 
     def advance(self) -> None:
-        """Begin what waits and can, do some control steps, and hand out what has ended."""
+        """Start waiting requests if possible, do some control steps, and hand out the results of ended requests."""
         if not self.requests:
             return
         if self._running and all(request.given_up for request in self._running.values()):
@@ -155,8 +155,8 @@ class _Batch:
         if stage is None:
             return
         if self._running:
-            stage.launch(STEPS_AT_ONCE)  # what follows prepares more work meanwhile
-        if len(waiting) <= self._slots - len(self._running):  # else all wait until there are more slots
+            stage.launch(STEPS_AT_ONCE)  # meanwhile, the following lines prepare more work
+        if len(waiting) <= self._slots - len(self._running):  # otherwise all wait until there are enough slots
             free = [slot for slot in range(self._slots) if slot not in self._running]
             for slot, request in zip(free, waiting, strict=False):
                 stage.put(slot, request.brains, request.episodes)
@@ -173,7 +173,7 @@ class _Batch:
                 request.done.set()
 
     def _open(self, waiting: Sequence[_Request]) -> None:
-        """See that there are worlds for so many jobs, and slots for so many requests."""
+        """Make sure that there are enough worlds and slots for the waiting requests."""
         worlds = min(self._most, sum(request.jobs for request in waiting))
         slots = min(MOST_SLOTS, len(waiting))
         if self._stage is not None and worlds <= self._worlds and slots <= self._slots:
@@ -199,13 +199,13 @@ class _Batch:
         self._forget_all()
 
     def _forget_all(self) -> None:
-        """Begin anew with what is running."""
+        """Drop the running requests and the worlds, so that these requests start again."""
         self._running.clear()
         self._stage = None
 
 
 def _in_words(error: BaseException, device: str, worlds: int) -> BaseException:
-    """The error, or an `ExneatError` where its user can do something about it."""
+    """The error, or an `ExneatError` if the user can do something about it."""
     if isinstance(error, RuntimeError | MemoryError) and "alloc" in f"{error}{type(error)}".lower():
         why = f"{device} has too little memory for {worlds} worlds"
         return ExneatError(f"executor=warp: {why}\n  set executor.worlds lower")

@@ -1,7 +1,7 @@
-"""One batch of worlds with its queue of jobs: whatever runs there takes a slot, and worlds that end take the next job.
+"""One batch of worlds with its queue of jobs: each request takes a slot, and worlds that finish take the next job.
 
-A control step is one program of kernels, captured as a CUDA graph on a GPU: take jobs, reset, observe, disturb, sense,
-activate, drive, step, keep count. The host sees no more than how many episodes have ended.
+A control step is one sequence of kernels, captured as a CUDA graph on a GPU: take jobs, reset, observe, disturb, sense,
+activate, drive, step, keep count. During episodes, the host only reads how many of them have ended.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Stage:
         worlds: as `HasBatch` opens them.
         sensor_std: sd of the normal noise on every reading.
         slots: S.
-        sensed_size, action_size, terms: of the task.
-        moments: whether statistics of what networks sense are wanted.
+        sensed_size, action_size, terms: numbers of the task's sensed values, actuators and reward terms.
+        moments: whether statistics of the sensed values are wanted.
     """
 
     def __init__(
@@ -73,10 +73,10 @@ class Stage:
             self._sensing = Sensing(count, slots, sensed_size) if moments else None
             self._overflow = wp.zeros(1, dtype=int)
             worlds.status.fill_(IDLE)
-            self._program()  # compiles and loads all kernels, which a capture must not
+            self._program()  # compiles and loads all kernels, which must not happen during a capture
 
     def put(self, slot: int, brains: Brains, episodes: Sequence[EpisodeSeeds]) -> None:
-        """Queue every brain in every episode; whatever had the slot before must be done."""
+        """Queue every brain in every episode; the slot's previous request must be done."""
         programs, count = packed(brains), len(brains.size)
         jobs = np.empty((count * len(episodes), 4), np.int32)
         jobs[:, 0], jobs[:, 3] = slot, np.arange(len(jobs))
@@ -96,7 +96,7 @@ class Stage:
             self._tail.write(0, np.array([tail + len(jobs)]))
 
     def launch(self, steps: int) -> None:
-        """Have the device do some control steps; waits for none of them."""
+        """Queue some control steps on the device, without waiting for them."""
         with wp.ScopedDevice(self.device):
             if self.device.is_cuda and self._graph is None:
                 with wp.ScopedCapture() as capture:
@@ -109,11 +109,11 @@ class Stage:
                     self._program()
 
     def look(self) -> tuple[NDArray[np.int32], bool]:
-        """(S,) how many episodes of each slot have ended when all that was launched is done; whether room ran out."""
+        """(S,) ended episodes of each slot once all launched steps are done, and whether room was exceeded."""
         return self._outcome.ended.numpy(), bool(self._overflow.numpy()[0])
 
     def fetch(self, slot: int, tally: Tally) -> None:
-        """Write what came of a slot whose episodes have all ended."""
+        """Write the results of a slot whose episodes have all ended to `tally`."""
         statuses, steps, totals, *moments = tally
         jobs, shape = statuses.size, statuses.shape
         statuses[:] = self._outcome.status[slot].numpy()[:jobs].reshape(shape)
@@ -148,7 +148,7 @@ class Stage:
         worlds.note_overflows(self._overflow)
 
     def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
-        """Enlarge what is too small; what is there stays, and the program is captured anew."""
+        """Enlarge arrays that are too small, keeping their entries; the steps are then captured again."""
         slots = self._slots
         if words > self._programs.here.shape[1]:
             self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
@@ -180,7 +180,7 @@ class Stage:
         self._episodes = episodes
 
     def _grow_queue(self, room: int) -> None:
-        """Room for all slots to be full; what waits moves to the front."""
+        """Enlarge the queue, so that all slots can be full; waiting jobs move to the front."""
         head, tail = int(self._jobs.head.numpy()[0]), int(self._tail.here[0])
         waiting = self._queue.here[(head + np.arange(tail - head)) % len(self._queue.here)]
         self._queue = self._queue.resized(widened(waiting, (room, 4)))
@@ -196,5 +196,5 @@ def _struct(struct: Any, shape: Any, dtype: type, *names: str) -> Any:
 
 
 def _ample(size: int) -> int:
-    """Room for some growth: genomes get larger from generation to generation."""
+    """A size with room for growth, since genomes get larger from generation to generation."""
     return size + size // 4 + 16
