@@ -1,9 +1,9 @@
-"""Compiling with numba: no GIL, cached between processes, never stale.
+"""Compiling with numba: without the GIL, cached between processes, never stale.
 
-numba's own cache forgets a function only when the file that holds it changes; a compiled episode,
-however, carries everything that it calls. So the cache directory is named after the contents of
-every file of ours that is compiled together, and functions that call code from elsewhere, such as a
-user's task, are compiled anew in each process.
+numba's own cache only invalidates a function when the file that defines it changes; a compiled
+episode, however, includes everything that it calls. The cache directory is therefore named after the
+contents of all of our files that are compiled together, and functions that call other code, such as
+a user's task, are compiled again in each process.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _COMPILED_ROOMS = ("tasks", "algorithms", "brains", "rollouts")
 
 @functools.cache
 def source_digest() -> str:
-    """Hexadecimal digest of all files of ours that are compiled together, and of NumPy's version."""
+    """Hexadecimal digest of all of our files that are compiled together, and of NumPy's version."""
     package = Path(__file__).parent
     digest = hashlib.sha256(version("numpy").encode())
     for room in _COMPILED_ROOMS:
@@ -40,7 +40,7 @@ def source_digest() -> str:
 
 @functools.cache
 def cache_directory() -> Path | None:
-    """Where compiled code is kept, or None where nothing can be written.
+    """Where compiled code is cached, or None if nothing can be written there.
 
     Below ``NUMBA_CACHE_DIR`` if that is set, else ``$XDG_CACHE_HOME/exneat``, else ``~/.cache/exneat``.
     """
@@ -53,10 +53,10 @@ def cache_directory() -> Path | None:
 
 
 def cache_root() -> Path:
-    """Where caches of all versions of the code lie side by side; see `cache_directory`.
+    """The directory that holds the caches of all versions of the code; see `cache_directory`.
 
     Raises:
-        RuntimeError: nothing is chosen and the user has no home directory.
+        RuntimeError: no environment variable names it, and the user has no home directory.
     """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
@@ -69,10 +69,10 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def compiled_lean(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same for what runs at every step: made part of its caller, and allocates nothing.
+    """The same for functions that run at every step: they are inlined into their callers, and must not allocate.
 
-    Passing tuples of arrays to a function and counting references to them costs several times as much as
-    what a step of a grid world does. Code that allocates nothing can leave out the counting.
+    Passing tuples of arrays to a function and counting references to them costs several times as much as a step of a
+    grid world. Code that does not allocate can leave out reference counting.
     """
     return _compiled(function, forceinline=True, _nrt=False)
 
@@ -81,18 +81,18 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
     dispatcher: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     directory = cache_directory()
     if directory is not None and _is_all_ours(function):
-        # numba has no argument for the place of a cache; this is its NUMBA_CACHE_DIR, and it stays for the process.
+        # numba has no argument for the cache's directory; this sets its NUMBA_CACHE_DIR for the rest of the process.
         config.CACHE_DIR = str(directory)
-        with contextlib.suppress(RuntimeError):  # nothing can be written, although there is such a directory
+        with contextlib.suppress(RuntimeError):  # nothing can be written, although the directory exists
             cache = _Cache(function)
-            # On a full disk numba turns to another place, whose name tells nothing of what was compiled.
+            # On a full disk, numba falls back to another directory, whose name does not depend on what was compiled.
             if directory in Path(cache.cache_path).parents:
                 dispatcher._cache = cache
     return dispatcher  # type: ignore[no-any-return]
 
 
 def _is_all_ours(function: Callable[..., Any]) -> bool:
-    """Whether the function, and every compiled one that it calls, stands in a file that names the cache directory."""
+    """Whether the function, and every compiled one that it calls, is in a file of the digest, see `source_digest`."""
     named: list[Any] = [function.__globals__.get(name) for name in function.__code__.co_names]
     ours = function.__module__.partition(".")[0] == __name__.partition(".")[0]
     return ours and all(_is_all_ours(other.py_func) for other in named if hasattr(other, "py_func"))
@@ -100,18 +100,18 @@ def _is_all_ours(function: Callable[..., Any]) -> bool:
 
 @functools.cache
 def _tell_damage() -> None:
-    """Say it once in a process."""
+    """Report a damaged cache once per process."""
     print(f"exneat: a file below {cache_directory()} is damaged: compiling anew", file=sys.stderr, flush=True)
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function, but a damaged file or a full disk costs no more than the time to compile."""
+    """numba's cache of a function, except that a damaged file or a full disk only costs the time to compile."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What is cached for a signature, or None."""
+        """The cached code for a signature, or None."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # unpickling a file that was cut short raises all kinds of errors
+        except Exception:  # unpickling a truncated file may raise anything
             _tell_damage()
             try:
                 self.flush()
@@ -120,13 +120,13 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Cache what was compiled for a signature."""
+        """Cache the code compiled for a signature."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
 
 def with_functions(template: Callable[..., Any], name: str, **functions: Callable[..., Any]) -> types.FunctionType:
-    """A copy of `template` in which the global names in `functions` mean those functions.
+    """A copy of `template` in which the global names in `functions` refer to those functions.
 
     This is how one episode loop serves every task: numba caches functions that call compiled globals,
     but not functions that take them as arguments or close over them. `name` must differ between
@@ -138,14 +138,14 @@ def with_functions(template: Callable[..., Any], name: str, **functions: Callabl
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]
-    """What this process compiles; numba tells it under a lock of its own, and of compilations within others too."""
+    """Counts this process's compilations; numba calls it under its own lock, for nested compilations too."""
 
     def __init__(self) -> None:
         self.listeners: list[Callable[[bool], None]] = []
         self.spent, self._depth, self._began = 0.0, 0, 0.0
 
     def on_start(self, event: Any) -> None:
-        """Begin to count, and say whether the result will be cached."""
+        """Start to measure, and tell listeners whether the result will be cached."""
         self._depth += 1
         if self._depth == 1:
             self._began = time.perf_counter()
@@ -153,7 +153,7 @@ class _Compilations(event.Listener):  # type: ignore[misc]
                 tell(isinstance(event.data["dispatcher"]._cache, _Cache))
 
     def on_end(self, event: Any) -> None:
-        """Count to here."""
+        """Add the time since the start of the outermost compilation."""
         self._depth -= 1
         if self._depth == 0:
             self.spent += time.perf_counter() - self._began
@@ -164,13 +164,13 @@ event.register("numba:compile", _compilations)
 
 
 def seconds_compiled() -> float:
-    """How long this process has compiled so far (s)."""
+    """Time that this process has spent on compiling so far (s)."""
     return _compilations.spent
 
 
 @contextlib.contextmanager
 def announcing(tell: Callable[[bool], None]) -> Iterator[None]:
-    """Call `tell` before anything is compiled in this block, with whether that will be cached for other processes."""
+    """Within the block, call `tell` before each compilation, with whether it will be cached for other processes."""
     _compilations.listeners.append(tell)
     try:
         yield

@@ -1,6 +1,6 @@
 """Errors that a user can fix, and the checks that raise them.
 
-Every message names the thing, what was expected, what came and how to fix it, in at most three
+Every message names the thing, what was expected, what was given and how to fix it, in at most three
 lines; `exneat_cli.main` prints it without a traceback and exits with code 2.
 """
 
@@ -18,7 +18,7 @@ _LONGEST_VALUE = 160
 
 
 class ExneatError(Exception):
-    """Something that the user can fix: bad input, an unusable directory, a missing file."""
+    """An error that the user can fix: bad input, an unusable directory, a missing file."""
 
 
 class ConfigError(ExneatError):
@@ -28,7 +28,7 @@ class ConfigError(ExneatError):
         key: the setting's dotted name, as on the command line, e.g. ``noise.sensor_std``.
         expected: what would have been accepted, in words.
         came: the value that was given.
-        fix: one sentence on how to put it right; left out where `expected` says it already.
+        fix: one sentence on how to correct it; empty if `expected` makes that clear.
     """
 
     def __init__(self, key: str, expected: str, came: object, fix: str = "") -> None:
@@ -42,10 +42,10 @@ class ConfigError(ExneatError):
 
 
 def shortened(value: object) -> str:
-    """A value in Python's words, cut to what fits on a line or two."""
+    """The `repr` of a value, shortened to a line or two."""
     try:
         text = repr(value)
-    except ValueError:  # an integer of thousands of digits has no words
+    except ValueError:  # an integer of thousands of digits
         text = f"a value of type {type(value).__name__} with thousands of digits"
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
 
@@ -66,7 +66,7 @@ def check_real(key: str, value: object, low: float, high: float = math.inf) -> N
 
 
 def is_finite(value: float) -> bool:
-    """Whether a number is finite as a double: Python's whole numbers can be larger than any."""
+    """Whether a number is finite as a double; Python's integers can be too large for one."""
     return abs(value) <= sys.float_info.max
 
 
@@ -83,26 +83,26 @@ def check_choice(key: str, value: object, choices: Sequence[str]) -> None:
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6, prefix: str = "") -> str:
-    """Ask whether the nearest of what is known was meant, with `prefix` before it; empty if none is near."""
+    """Ask whether the nearest `known` word was meant, with `prefix` before it; empty if none is near."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
     return f"did you mean {prefix}{close[0]}?" if close else ""
 
 
 def check_text(key: str, value: object, expected: str = "text") -> None:
-    """Refuse anything but printable text with a `ConfigError`, which says in words what was `expected`."""
+    """Refuse anything but printable text with a `ConfigError`, which says that `expected` was expected."""
     if not isinstance(value, str) or not value or not value.isprintable():
         is_plain = isinstance(value, bool | int | float)
         raise ConfigError(key, expected, value, "in a YAML file such text stands in quotes" if is_plain else "")
 
 
 def check_path(key: str, value: object, expected: str = "a directory") -> Path:
-    """Return the path that a setting names, a leading ``~`` being the home directory; see `check_text`."""
+    """Return the path that a setting names, with a leading ``~`` as the home directory; see `check_text`."""
     check_text(key, value, expected)
     return Path(os.path.expanduser(str(value)))
 
 
 def check_section(key: str, value: object) -> Mapping[str, Any]:
-    """Return keys with values, and refuse anything else with a `ConfigError`."""
+    """Return a mapping from keys to values, and refuse anything else with a `ConfigError`."""
     if not isinstance(value, Mapping):
         raise ConfigError(key, "a section with keys of its own", value)
     return value
@@ -111,7 +111,7 @@ def check_section(key: str, value: object) -> Mapping[str, Any]:
 def check_keys(prefix: str, values: Mapping[str, Any], known: Collection[str]) -> None:
     """Refuse a key that is not `known` with an `ExneatError` that names the nearest one.
 
-    In messages `prefix`, e.g. ``task.``, stands before the keys.
+    In messages, keys are preceded by `prefix`, e.g. ``task.``.
     """
     for key in values:
         if key not in known:

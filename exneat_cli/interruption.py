@@ -1,9 +1,9 @@
-"""Ctrl-C, SIGTERM and their like raise KeyboardInterrupt in the main thread; a second Ctrl-C ends the process at once.
+"""Ctrl-C, SIGTERM and similar signals raise KeyboardInterrupt in the main thread; a second Ctrl-C ends it at once.
 
-A signal that is ignored when the program begins, as `nohup` and scripts arrange it, stays ignored. Files are written
-atomically and checkpoints are exact, so a run may be interrupted almost anywhere and resumes to the same bytes. Three
-things need care: compiled code that reads NumPy's generators (`uninterrupted`), libraries that raise another error
-instead (`signal_heard`), and the workers of Hydra's launchers (`launching`, `as_worker`).
+A signal that is ignored when the program starts, as with `nohup` and in scripts, stays ignored. Files are written
+atomically and checkpoints are exact, so a run may be interrupted almost anywhere, and produces the same bytes when it
+is resumed. Three things need care: compiled code that reads NumPy's generators (`uninterrupted`), libraries that raise
+another error instead (`signal_heard`), and the workers of Hydra's launchers (`launching`, `as_worker`).
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ SIGNALS: tuple[int, ...] = (
     *(signal.SIGTERM, signal.SIGINT, signal.SIGHUP),
     *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),  # from clusters, before a time limit kills
 )
-"""What interrupts."""
+"""Signals that interrupt."""
 _OF_GROUPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-"""Those that a terminal or a shell sends to workers too."""
+"""Signals that a terminal or a shell also sends to workers."""
 _HELD, _STALE_SECONDS = "held", 60.0
 _heard: int | None = None
 _workplace: int | None = None
@@ -36,7 +36,7 @@ _workplace: int | None = None
 
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
-    """Raise KeyboardInterrupt upon the first of `SIGNALS` that was not ignored before; for the main thread."""
+    """In the block, raise KeyboardInterrupt upon the first of `SIGNALS` that is not ignored; for the main thread."""
     global _heard
     heeded = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
     before, hook = _set_handlers(dict.fromkeys(heeded, _hear)), sys.unraisablehook
@@ -48,9 +48,9 @@ def listening() -> Iterator[None]:
 
 
 def name_window_library() -> None:
-    """Say which library MuJoCo's windows need, unless the user did: else pyGLFW asks another Python for its version.
+    """Set the library of MuJoCo's windows, unless the user has: otherwise pyGLFW queries it in another Python process.
 
-    That one would complain of Ctrl-C, or that nobody reads its answer any more.
+    That process would print errors upon Ctrl-C, or when its output is no longer read.
     """
     package = importlib.util.find_spec("glfw")
     if package is None or package.origin is None:
@@ -62,15 +62,15 @@ def name_window_library() -> None:
 
 
 def signal_heard() -> int | None:
-    """Number of the signal that was heard, None before: whatever error surfaces after it is the interruption."""
+    """Number of the signal received, None before: any error that surfaces after it is due to the interruption."""
     return _heard
 
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Put signals off until the end of the block; does nothing outside of the main thread, which alone hears them.
+    """Defer signals until the end of the block; does nothing outside the main thread, the only one that receives them.
 
-    numba 0.68 reads NumPy's generators through Python code, and a signal that raises there crashes the process.
+    numba 0.68 reads NumPy's generators through Python code, and a signal handler that raises there crashes the process.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -87,15 +87,16 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def launching(workplace: Path) -> Iterator[None]:
-    """For whoever starts workers, whose jobs lock `workplace`: Ctrl-C is not for them, and a signal ends jobs first."""
+    """For the launcher of workers whose jobs lock `workplace`: they ignore Ctrl-C, and a signal ends jobs first."""
     global _workplace
     if _heard is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
-    from multiprocessing import resource_tracker  # takes longer to import than --help to answer
+    from multiprocessing import resource_tracker  # importing it takes longer than --help
 
     resource_tracker.ensure_running()  # its first start would unblock the signals
     over = threading.Event()
-    # Children inherit what the main thread blocks; this one takes the signals, which Python handles in the main one.
+    # Children inherit the signals that the main thread blocks; this thread receives them, and Python handles them in
+    # the main thread.
     threading.Thread(target=over.wait, daemon=True).start()
     _workplace = os.open(workplace, os.O_RDONLY)
     signal.pthread_sigmask(signal.SIG_BLOCK, _OF_GROUPS)
@@ -110,13 +111,13 @@ def launching(workplace: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def as_worker(workplace: Path) -> Iterator[None]:
-    """For a job in a worker: SIGTERM interrupts it and refuses the next, and the process ends with its parent."""
+    """For a job in a worker: SIGTERM interrupts it and prevents further jobs, and the process ends with its parent."""
     import ctypes
     import multiprocessing
 
     if _heard is not None:
         raise KeyboardInterrupt
-    with contextlib.suppress(AttributeError):  # Linux alone has it
+    with contextlib.suppress(AttributeError):  # only on Linux
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if (parent := multiprocessing.parent_process()) and parent.pid != os.getppid():
         os._exit(1)
@@ -136,18 +137,18 @@ def as_worker(workplace: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def scratch_directory(prefix: str = "exneat-", parent: Path | None = None) -> Iterator[Path]:
-    """A directory for as long as the block lasts, below TMPDIR or `parent`; those that killed processes left go too."""
+    """A directory below TMPDIR or `parent` for the block; also removes directories left by killed processes."""
     parent = parent or Path(tempfile.gettempdir())
     for held in parent.glob(f"{prefix}*/{_HELD}"):
         with contextlib.suppress(OSError), open(os.open(held, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.fstat(file.fileno()).st_mtime < time.time() - _STALE_SECONDS:  # else it may be about to be locked
+            if os.fstat(file.fileno()).st_mtime < time.time() - _STALE_SECONDS:  # a newer one may not be locked yet
                 shutil.rmtree(held.parent)
     with (
         tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name,
         open(Path(name) / _HELD, "wb") as file,
     ):
-        with contextlib.suppress(OSError):  # a disk without locks, on which nobody will sweep
+        with contextlib.suppress(OSError):  # a disk without locks, where such directories are never removed
             fcntl.flock(file, fcntl.LOCK_EX)
         yield Path(name)
 
@@ -161,12 +162,12 @@ def _hear(number: int, _: object) -> None:
         for process in _descendants(os.getpid()):
             with contextlib.suppress(OSError):
                 os.kill(process, signal.SIGTERM)
-        fcntl.flock(_workplace, fcntl.LOCK_EX)  # joblib kills its workers upon KeyboardInterrupt: let jobs end first
+        fcntl.flock(_workplace, fcntl.LOCK_EX)  # joblib kills its workers upon KeyboardInterrupt: jobs must end first
     raise KeyboardInterrupt
 
 
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
-    """Send the signal again where Python drops KeyboardInterrupt: in callbacks, such as one of the import system's."""
+    """Send the signal again if Python drops KeyboardInterrupt, as in callbacks of the import system."""
     if _heard is not None and isinstance(lost.exc_value, KeyboardInterrupt):
         signal.signal(_heard, _hear)
         threading.Timer(0.05, os.kill, (os.getpid(), _heard)).start()
@@ -179,7 +180,7 @@ def _set_handlers(handlers: dict[int, Any]) -> dict[int, Any]:
 
 
 def _descendants(process: int) -> Iterator[int]:
-    """Ids of the processes that one started, and so on; none where /proc is missing."""
+    """Ids of all descendants of a process; none if /proc is missing."""
     for path in Path(f"/proc/{process}/task").glob("*/children"):
         with contextlib.suppress(OSError):
             for child in path.read_text(encoding="ascii").split():

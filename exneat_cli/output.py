@@ -1,7 +1,7 @@
-"""What a process prints, where nobody may read it any more: that ends or fails nothing.
+"""Printing that never fails, even if the output cannot be written any more.
 
-The reader of a pipe leaves, a terminal closes, a disk under a log is full, a descriptor was never open: `print` would
-raise, amid a run of hours. What cannot be written is lost instead.
+When the reader of a pipe leaves, a terminal closes, the disk of a log is full or a descriptor was never open, `print`
+would raise, possibly after hours of training. Here, output that cannot be written is lost instead.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from collections.abc import Iterator
 from typing import Any, TextIO
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Full disk, used-up quota, limit of file size: no fault of ours, wherever it is met."""
+"""Full disk, exhausted quota, limit of file size: errors of the system, not of this program."""
 
 
 @contextlib.contextmanager
 def forgiving_output() -> Iterator[list[OSError]]:
-    """Print to standard output and error without errors within the block.
+    """Within the block, printing to standard output and standard error never raises.
 
-    Yields what went wrong with standard output so far, but for a reader that left.
+    Yields the errors of standard output so far, for lack of space only.
     """
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
-        except OSError:  # else the next file that is opened would have this number, and a library's words in it
+        except OSError:  # otherwise the next file opened would get this number, and a library's output
             os.open(os.devnull, os.O_RDWR)
     before = sys.stdout, sys.stderr
     lost: list[OSError] = []
@@ -42,13 +42,13 @@ def forgiving_output() -> Iterator[list[OSError]]:
 
 
 def _forgiving(stream: TextIO | None, lost: list[OSError]) -> TextIO:
-    if stream is None:  # the descriptor was closed when Python began
+    if stream is None:  # the descriptor was closed when Python started
         return open(os.devnull, "w", encoding="utf-8", errors="replace")
     try:
         raw = _Forgiving(stream.fileno(), lost)
-    except (OSError, ValueError):  # a notebook's or a test's, which is no file
+    except (OSError, ValueError):  # a notebook's or a test's stream, which is not a file
         return stream
-    # Unbuffered, as by PYTHONUNBUFFERED, Python keeps no lines: then a line is written when it ends.
+    # Streams that are unbuffered, as with PYTHONUNBUFFERED, become line-buffered.
     by_line = any(getattr(stream, name, True) for name in ("line_buffering", "write_through"))
     buffered = io.BufferedWriter(raw)
     return io.TextIOWrapper(buffered, stream.encoding, "backslashreplace", line_buffering=by_line)
@@ -60,9 +60,9 @@ class _Forgiving(io.FileIO):
         self._lost = lost
 
     def write(self, data: Any) -> int:
-        """Write what can be written."""
+        """Write `data` if possible."""
         try:
-            while (count := super().write(data)) is None:  # a pipe that does not wait, and is full
+            while (count := super().write(data)) is None:  # a full non-blocking pipe
                 select.select((), (self,), ())
         except OSError as error:
             if error.errno in NO_ROOM:

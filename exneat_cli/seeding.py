@@ -1,8 +1,8 @@
-"""Named random streams, all grown from one root seed.
+"""Named random streams, all derived from one root seed.
 
-Each purpose has a number of its own in the spawn key of a `numpy.random.SeedSequence`, so streams of
-different purposes never meet, and a new purpose leaves the others as they are. Validation and test
-episodes grow from a constant instead of the run's seed: every run and every variant faces the same ones.
+Each purpose has its own number in the spawn key of a `numpy.random.SeedSequence`, so streams of different purposes are
+independent, and a new purpose does not change the others. Validation and test episodes are derived from a constant
+instead of the run's seed, so that they are the same for all runs and variants.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SHARED_ROOT = 0
 
 
 class EpisodeSeeds(NamedTuple):
-    """What makes one episode: the world, the noise on the sensors, and chance in the agent's own actions."""
+    """The seeds of one episode: of the world, the sensor noise, and random numbers in the agent's actions."""
 
     world: SeedSequence
     sensor_noise: SeedSequence
@@ -40,18 +40,18 @@ class EpisodeSeeds(NamedTuple):
 def stream(root: int, purpose: str, *indices: int) -> SeedSequence:
     """Seed of one stream of a run with seed `root`; `purpose` is a key of `STREAMS`.
 
-    `indices` say which of the purpose's streams, e.g. a subpopulation, or a generation and an episode.
+    `indices` select one of the purpose's streams, e.g. by subpopulation, or by generation and episode.
     """
     return SeedSequence(root, spawn_key=(STREAMS[purpose], *indices))
 
 
 def generator(seed: SeedSequence) -> Generator:
-    """A PCG64 generator at the start of `seed`'s stream, the kind that Gymnasium uses."""
+    """A PCG64 generator at the start of the stream of `seed`, as Gymnasium uses."""
     return Generator(PCG64(seed))
 
 
 def training_episodes(root: int, generation: int, count: int, first: int = 0) -> list[EpisodeSeeds]:
-    """`count` episodes of one generation (counted from 0), from number `first` on; its teams share them."""
+    """`count` episodes of one generation (counted from 0), from number `first` on, the same for all of its teams."""
     purposes = ("world", "sensor_noise", "action_ties")
     return [
         EpisodeSeeds(*(stream(root, purpose, generation, episode) for purpose in purposes))
@@ -60,16 +60,16 @@ def training_episodes(root: int, generation: int, count: int, first: int = 0) ->
 
 
 def shared_episodes(purpose: str, count: int) -> list[EpisodeSeeds]:
-    """The first `count` episodes of ``"validation"`` or ``"test"``, equal for all runs and variants."""
+    """The first `count` episodes of ``"validation"`` or ``"test"``, the same for all runs and variants."""
     kinds = [[stream(SHARED_ROOT, purpose, episode, kind) for episode in range(count)] for kind in range(3)]
     return [EpisodeSeeds(*seeds) for seeds in zip(*kinds, strict=True)]
 
 
 def generator_in(state: Mapping[str, Any]) -> Generator:
-    """A generator that goes on from the state of another, ``generator.bit_generator.state``.
+    """A generator that continues from the state of another, ``generator.bit_generator.state``.
 
     Raises:
-        KeyError, OverflowError, TypeError, ValueError: it is no such state.
+        KeyError, OverflowError, TypeError, ValueError: the state is invalid.
     """
     bit_generator = PCG64(0)
     bit_generator.state = dict(state)  # type: ignore[assignment]
