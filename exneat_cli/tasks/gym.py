@@ -141,7 +141,7 @@ class GymTask(Task):
 
     @property
     def resting_action(self) -> NDArray[np.float64]:
-        """The values nearest to 0 that a Box allows; the first discrete action, whatever it means."""
+        """The values nearest to 0 that a Box allows; the first discrete action, regardless of its meaning."""
         interface = self._interface
         if interface.is_discrete:
             return np.asarray(np.eye(interface.actions)[0])

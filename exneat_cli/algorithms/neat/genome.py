@@ -85,7 +85,7 @@ class ArrayGenome:
     def configure_crossover(self, genome1: ArrayGenome, genome2: ArrayGenome, config: DefaultGenomeConfig) -> None:
         """Make a child; of equally fit parents, the second one counts as fitter, as in neat-python.
 
-        With probability 1 - `crossover_prob` it is a copy of the first parent, whatever their fitness. A child of two
+        With probability 1 - `crossover_prob` it is a copy of the first parent, regardless of fitness. A child of two
         parents has the geometric mean of their mutation powers.
         """
         if config.crossover_prob < 1.0 and config.generator.random() >= config.crossover_prob:

@@ -45,7 +45,7 @@ ROW, COLUMN, STEPS = range(3)
 
 
 class GridTask(Task):
-    """A grid world: what follows from its sensors and moves.
+    """A grid world: the sensors, moves and parts that all of them share.
 
     The storage that `open` gives is a named tuple with at least `path`, (N, N), 1 where one can walk and 0 on walls;
     `signals`, (2, N, N), what each tile emits, 0 on walls; and `agent`, see `ROW`.
