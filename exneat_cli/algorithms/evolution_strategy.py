@@ -136,13 +136,13 @@ class EvolutionStrategy(Algorithm):
         """
         start = problem.evolution.initial_connection
         if start not in _STARTS:
-            fix = f"algorithm={self.name} changes weights alone, so all connections are there at the start"
+            fix = f"algorithm={self.name} only changes weights, so all connections must exist at the start"
             raise ConfigError("evolution.initial_connection", " or ".join(_STARTS), start, fix)
         if self.normalise and not has_biases(problem.evolution):
             fix = "a network holds the mean of its inputs in its biases: set evolution.bias_init_stdev above 0"
             raise ConfigError("algorithm.normalise", "false for networks without biases", True, fix)
         if problem.pairing != "rank":
-            fix = f"algorithm={self.name} has one team, nothing to pair"
+            fix = f"algorithm={self.name} has one team, so there is nothing to pair"
             raise ConfigError("pairing", "rank, its default", problem.pairing, fix)
         if problem.judging != "last":
             fix = f"algorithm={self.name} asks for new teams in every generation, which have no earlier episodes"

@@ -49,13 +49,17 @@ class Executor:
         check_whole("executor.worlds", self.worlds, 1, 1_000_000)
         if self.device is not None:
             if self.name != "warp":
-                raise ConfigError("executor.device", f"none with executor={self.name}", self.device, "warp has one")
+                raise ConfigError(
+                    "executor.device", f"none with executor={self.name}", self.device, "only executor=warp has one"
+                )
             if not isinstance(self.device, str) or not _DEVICE.fullmatch(self.device):
                 raise ConfigError("executor.device", "null, cpu, cuda or cuda:<number>", self.device)
         if self.address is None:
             return
         if self.name != "dask":
-            raise ConfigError("executor.address", f"none with executor={self.name}", self.address, "executor=dask has")
+            raise ConfigError(
+                "executor.address", f"none with executor={self.name}", self.address, "only executor=dask has one"
+            )
         if not isinstance(self.address, str) or not _ADDRESS.fullmatch(self.address):
             raise ConfigError("executor.address", "a scheduler's address such as tcp://10.0.0.1:8786", self.address)
         if self.workers:

@@ -186,7 +186,7 @@ class _Trial:
         if function is None and name in ("locate", "sense", "drive"):
             return
         if not callable(function) or (self.simulation.compiled and not hasattr(function, "py_func")):
-            fix = "compile it by exneat_cli.compiling, or say Simulation(..., compiled=False)"
+            fix = "compile it with exneat_cli.compiling, or use Simulation(..., compiled=False)"
             raise ConfigError(f"{self.kind}.open: {name}", "a compiled function", function, fix)
 
     def run(self) -> None:

@@ -229,7 +229,7 @@ def _check_parts(parts: object, sensors: int, actuators: int) -> None:
                 check_whole(f"{key}.{kind}", entry, 0, count - 1)
                 if (kind, entry) in taken:
                     fix = f"task.parts.{taken[kind, entry]}.{kind} has {entry} already"
-                    raise ConfigError(f"{key}.{kind}", "entries that no part has twice", list(entries), fix)
+                    raise ConfigError(f"{key}.{kind}", "entries that occur only once in all parts", list(entries), fix)
                 taken[kind, entry] = name
 
 

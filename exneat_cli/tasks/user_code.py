@@ -48,8 +48,8 @@ def find_task(section: Mapping[str, Any], registry: Mapping[str, type[Task]]) ->
         if not _CODE.fullmatch(reference):
             raise ConfigError(key, "module:name, e.g. task.kind=my_package.my_module:MyTask", reference)
         if reference not in NAMED and not _is_there(key, reference, registry):
-            fix = f"nothing is imported because a run or --config-path says so; if you trust it, add {key}={reference}"
-            raise ConfigError(key, "code that is registered, or named by yourself", reference, fix)
+            fix = f"a run or --config-path alone cannot import code; if you trust it, add {key}={reference}"
+            raise ConfigError(key, "code that is registered, or that you name yourself", reference, fix)
     kind, name = section.get("kind"), section.get("name")
     if kind is None:
         return _by_name(name, registry)

@@ -71,7 +71,7 @@ class Geometry:
             return PRINTED_VECTORS[self.name] if ants else _by_position(self.name, parts)
         if self.name == "auto":
             if any(part.likeness < 0 for part in parts):
-                raise ConfigError("geometry", "single, all or custom", "auto", f"nobody compared these parts: {names}")
+                raise ConfigError("geometry", "single, all or custom", "auto", f"parts were not compared: {names}")
             return _numbered([part.likeness for part in parts])
         assert self.vector is not None
         if len(self.vector) != len(parts):
@@ -176,7 +176,8 @@ def plan_modules(task: Task, geometry: Geometry, linkage: str, wiring: Wiring, *
     for shared in set(subpopulations):
         widths = {module.name: module.shape for module in modules if module.subpopulation == shared}
         if len(set(widths.values())) > 1:
-            raise ConfigError("geometry", "sharers of equal widths (inputs, hidden nodes, outputs)", widths)
+            expected = "modules of equal size (inputs, hidden nodes, outputs) where they share genomes"
+            raise ConfigError("geometry", expected, widths)
     if central or wiring.trunk == "module":
         modules.append(_trunk_module(task, modules, hidden, central=central))
     return Plan(tuple(modules), task.sensed_size, len(task.actuator_names))
@@ -199,7 +200,7 @@ def _has_central(task: Task, wiring: Wiring) -> bool:
         driven = ", ".join(task.actuator_names[actuator] for actuator in trunk.actuators)
         if driven and wiring.trunk != "module":
             fix = "or set wiring.central=true"
-            raise ConfigError("wiring.trunk", f"module, for nobody else drives {driven}", wiring.trunk, fix)
+            raise ConfigError("wiring.trunk", f"module, as nothing else drives {driven}", wiring.trunk, fix)
         if wiring.trunk == "module" and not driven:
             raise ConfigError(
                 "wiring.trunk", "none or shared", "module", f"the trunk of {named} has no joints to drive"

@@ -109,7 +109,7 @@ def forget() -> None:
     NAMED.discard("exneat_loud:Loud-v0")
 
 
-REFUSED = "task.env_id: expected code that is registered, or named by yourself, got 'exneat_loud:Loud-v0'"
+REFUSED = "task.env_id: expected code that is registered, or that you name yourself, got 'exneat_loud:Loud-v0'"
 
 
 def test_a_run_directory_never_has_code_imported(loud: Path, capfd: pytest.CaptureFixture[str]) -> None:

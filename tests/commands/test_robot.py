@@ -58,7 +58,7 @@ def test_a_model_that_cannot_be_used_is_refused_before_anything_is_made(
     ("settings", "named"),
     [
         ("task.model=hexapod linkage=feedback wiring.central=false", "linkage"),
-        ("task.model=humanoid wiring.central=false", "wiring.trunk: expected module, for nobody else drives abdomen_y"),
+        ("task.model=humanoid wiring.central=false", "wiring.trunk: expected module, as nothing else drives abdomen_y"),
         ("task.model=ant wiring.trunk=module", "wiring.trunk: expected none or shared"),
         ("task.model=ant wiring.trunk=shared wiring.central=true", "wiring.trunk"),
         ("task.model=walker2d geometry=fb", "geometry: expected parts that all stand in front or behind"),

@@ -117,7 +117,7 @@ def test_sharers_of_different_widths_are_refused() -> None:
             one, *others = super().parts
             return (replace(one, sensors=one.sensors[:-1]), *others)
 
-    with pytest.raises(ConfigError, match="sharers of equal widths"):
+    with pytest.raises(ConfigError, match="modules of equal size"):
         planned(Lopsided())
     assert planned(Lopsided(), "all")
 

@@ -149,7 +149,7 @@ class EvolutionSettings:
             if not 0.0 < lowest <= self.weight_mutate_power <= highest:
                 expected = "0 < weight_mutate_power_min <= weight_mutate_power <= weight_mutate_power_max"
                 powers = f"{lowest:g}, {self.weight_mutate_power:g}, {highest:g}"
-                raise ConfigError("evolution.weight_mutate_power", expected, powers, "of mutation=adaptive")
+                raise ConfigError("evolution.weight_mutate_power", expected, powers, "for mutation=adaptive")
 
 
 RECURRENT = EvolutionSettings(

@@ -62,7 +62,8 @@ class RobotWorlds:
         spatial = int(np.sum(model.wrap_type != mujoco.mjtWrap.mjWRAP_JOINT))
         if self._needs_forces and (model.neq or spatial):
             came = f"{model.neq} equality constraints, {spatial} points of spatial tendons"
-            raise ConfigError("task.model", "none with executor=warp, whose contact forces lack theirs", came)
+            expected = "a model without any for executor=warp, which omits them from contact forces"
+            raise ConfigError("task.model", expected, came)
         try:
             self.model = mujoco_warp.put_model(model)
             self.data = mujoco_warp.make_data(model, nworld=count, nconmax=CONTACTS * room, njmax=ROWS * room)
