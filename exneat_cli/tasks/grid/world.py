@@ -1,7 +1,7 @@
 """What the grid worlds share: tiles, senses, moves, and the base class of a new world.
 
 A world has N x N tiles. Every tile carries two signals and is path or wall; the border is wall. The agent
-stands on a path tile and senses the first neighbour on each side.
+stands on a path tile and senses the adjacent tile on each side.
 
 Observation (8 numbers without a unit, clipped to [0, 1]):
 
@@ -103,7 +103,7 @@ class GridTask(Task):
 
 @compiled
 def draw_tiles(eligible: NDArray[np.int64], count: int, rng: Generator) -> NDArray[np.int64]:
-    """(count, 2) rows and columns of different tiles, drawn from those that are not 0 in `eligible`, (N, N)."""
+    """(count, 2) rows and columns of different tiles, drawn from the nonzero entries of `eligible`, (N, N)."""
     tiles = np.argwhere(eligible)
     # The first steps of a Fisher-Yates shuffle.
     for k in range(count):

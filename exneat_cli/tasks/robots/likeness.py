@@ -19,7 +19,7 @@ _PLACES = 1e-3
 _SHARE = 0.2
 """Masses, moments of inertia about any axis, damping, friction loss and armature may differ by this share of the
 larger one, stiffness by this share of the body's largest: the armature of Humanoid's hips differs by 20%, and one of
-its knees has a spring of 1 N m/rad, the other none, beside hips of 20."""
+its knees has a spring of 1 N m/rad and the other none, while its hips have 20."""
 _ROUND_OFF = 1e-6
 """Relative tolerance for values that must be equal: ranges, gears, sizes, friction."""
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)

@@ -1,1 +1,1 @@
-"""Many worlds of one robot side by side on a GPU, stepped by MuJoCo Warp; imported only when asked for."""
+"""Many worlds of one robot in parallel on a GPU, stepped by MuJoCo Warp; imported only when needed."""

@@ -205,6 +205,6 @@ def drive(
 
 @wp.kernel
 def note_overflows(which: int, overflow: wp.array(dtype=int), flag: wp.array(dtype=int)):
-    """Set the flag if one of these bits is set in some world."""
+    """Set `flag`, (1,), if a bit of `which` is set for any world."""
     if (overflow[wp.tid()] & which) != 0:
         flag[0] = 1
