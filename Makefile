@@ -48,7 +48,7 @@ format: $(VENV)/installed ## bring the code into shape
 sweep-%: $(VENV)/installed ## all runs of one experiment that are missing, e.g. make sweep-ant BUDGET=paper PUBLISH=true
 	$(BIN)/exneat sweep experiment=$* budget=$(BUDGET) publish=$(PUBLISH) $(SIDE_BY_SIDE)
 
-reproduce: $(VENV)/installed ## train what is missing of all experiments, then report: make reproduce BUDGET=quick|paper
+reproduce: $(VENV)/installed ## do the missing runs of all experiments, then report: make reproduce BUDGET=quick|paper
 	@status=0; for experiment in $(EXPERIMENTS); do $(MAKE) --no-print-directory sweep-$$experiment || status=1; done; \
 	$(BIN)/exneat report budget=$(BUDGET) && exit $$status
 
@@ -57,7 +57,7 @@ walking.gif: $(VENV)/installed ## five seconds of a champion for the README, at 
 	$(BIN)/exneat watch run=$(RUN) format=gif steps=100 width=360 height=270 output=docs/images/walking.gif
 	@test $$(wc -c < docs/images/walking.gif) -le 3000000 || { echo "docs/images/walking.gif is above 3 MB"; exit 1; }
 
-report: $(VENV)/installed ## every table and figure from the runs there are; trains nothing
+report: $(VENV)/installed ## every table and figure from the existing runs; trains nothing
 	$(BIN)/exneat report $(OF_BUDGET)
 
 figure-%: $(VENV)/installed ## one figure, e.g. make figure-4.3

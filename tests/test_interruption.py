@@ -171,7 +171,7 @@ def test_whatever_error_comes_after_a_signal_is_the_interruption(
 
     monkeypatch.setattr("exneat_cli.main.importlib.import_module", interrupted)
     assert main(["report"]) == 143
-    assert capsys.readouterr().err.splitlines() == ["exneat: interrupted; to go on:", "exneat report"]
+    assert capsys.readouterr().err.splitlines() == ["exneat: interrupted; to continue:", "exneat report"]
 
 
 def test_a_program_that_is_done_ends_with_its_own_exit_code_whatever_comes_late() -> None:

@@ -32,21 +32,21 @@ _FLAGS = ("--help", "--multirun", "--config-dir", "--config-path", "--config-nam
 class CommandLine:
     """What was typed after ``exneat``."""
 
-    words: tuple[str, ...]  # all of it, and exneat before, for manifests
-    primary: str | None  # the YAML file that the composition starts from, if from any
-    directories: tuple[Path, ...]  # where YAML files are looked for, in this order
+    words: tuple[str, ...]  # all of it, beginning with exneat, for manifests
+    primary: str | None  # the YAML file that the composition starts from, if any
+    directories: tuple[Path, ...]  # where YAML files are searched, in this order
     settings: tuple[str, ...]  # key=value, as Hydra's composition takes them
     launcher: tuple[str, ...]  # the same for Hydra's launcher
     config_path: Path | None  # a directory that comes before all others, such as a run's
-    multirun: bool  # whether settings with several values are to be gone through
-    shown: str  # help or job if that is all that is asked for, else empty
-    bases: dict[Any, DictConfig] = field(default_factory=dict, repr=False, compare=False)  # compositions made before
+    multirun: bool  # whether to run every combination of settings with several values
+    shown: str  # help or job if only that is to be printed, else empty
+    bases: dict[Any, DictConfig] = field(default_factory=dict, repr=False, compare=False)  # earlier ones
 
     def compose(self, *keys: str) -> dict[str, Any]:
-        """Compose the settings with the YAML files, as dicts, lists, numbers and strings; without `keys` all of them.
+        """Compose settings and YAML files to dicts, lists, numbers and strings: those of `keys`, or all without `keys`.
 
         Raises:
-            ExneatError: they do not fit together, or a key or what a value refers to is not there.
+            ExneatError: they do not fit together, or a key or what a value refers to is missing.
         """
         texts: list[Override] = []
         values: list[Override] = []
@@ -65,10 +65,10 @@ class CommandLine:
         return {str(key): value for key, value in plain.items()}
 
     def compose_only(self, needed: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Any]:
-        """Compose all settings, see `compose`, which must be those `needed` and may be the `optional` ones.
+        """Compose all settings as `compose` does: those `needed`, perhaps `optional` ones, and no others.
 
         Raises:
-            ExneatError: as `compose`, or another key is there.
+            ExneatError: as for `compose`, or there is another key.
         """
         plain = self.compose()
         check_keys("", plain, (*needed, *optional))
@@ -76,9 +76,9 @@ class CommandLine:
         return plain
 
     def _base(self, chosen: tuple[str, ...]) -> DictConfig:
-        """What the YAML files say with these options of groups, without Hydra's own section.
+        """The composition of the YAML files with these options of groups, without Hydra's own section.
 
-        Hydra takes a tenth of a second for it, and the runs of an experiment choose the same few options.
+        It is kept, since Hydra takes a tenth of a second and the runs of an experiment use the same few options.
         """
         key = (self.primary, self.directories, chosen)
         if key not in self.bases:
@@ -88,7 +88,7 @@ class CommandLine:
 
     @contextlib.contextmanager
     def composed(self) -> Iterator[DictConfig]:
-        """Compose the settings as Hydra does, with the section of its own; Hydra is at hand amid the block.
+        """Compose the settings with Hydra's own section; Hydra stays initialised within the block.
 
         Raises:
             ExneatError: they do not fit together.
@@ -104,9 +104,9 @@ class CommandLine:
             yield config
 
     def names(self, key: str) -> bool:
-        """Whether the value of a key is the user's own word: that of a setting, or of a file that he chose.
+        """Whether the user chose the value of a key, by a setting or by selecting the file that has it.
 
-        What ``--config-path`` holds is not: it may be the directory of anybody's run.
+        Files in ``--config-path`` do not count: it may be the directory of a stranger's run.
         """
         return self.config_path is None or any(text.lstrip("+").partition("=")[0] == key for text in self.settings)
 
@@ -124,7 +124,7 @@ class CommandLine:
         }
 
     def show(self) -> str:
-        """What is asked for with ``--cfg job``: the composition as YAML; with ``--help``: every key."""
+        """The text to print: for ``--cfg job`` the composition as YAML, for ``--help`` every key."""
         if self.shown == "job":
             from exneat_cli.records import as_yaml  # takes longer to import than --help to answer
 
@@ -142,7 +142,7 @@ class CommandLine:
 
 
 def _shown(config: DictConfig, key: str) -> Any:
-    """A value as it comes out, or as it is written where it refers to what is not chosen yet."""
+    """A resolved value, or the value as written if it refers to something that is not chosen yet."""
     try:
         value = config[key]
         return OmegaConf.to_container(value, resolve=True) if OmegaConf.is_config(value) else value
@@ -160,7 +160,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
     """Read flags and settings, in any order.
 
     Raises:
-        ExneatError: a flag is unknown or lacks its value, or a setting cannot be read, is not the user's to make, or
+        ExneatError: a flag is unknown or lacks its value, or a setting cannot be read, may not be set by the user, or
             has several values without ``-m``.
     """
     flags, unknown = _flag_parser().parse_known_intermixed_args(list(arguments))
@@ -168,13 +168,13 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         hint = nearest(unknown[0], _FLAGS) or f"settings are written key=value, see exneat {command} --help"
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
-        raise ExneatError(f"-m: exneat train alone goes through several values, exneat {command} does not")
+        raise ExneatError(f"-m: only exneat train runs several values, exneat {command} does not")
     shipped = shipped_directory("conf")
     for own in flags.config_dir:
         for path in own.rglob("*.yaml"):
             name = path.relative_to(own)
             if (shipped / name).exists():
-                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be taken instead; rename yours")
+                raise ExneatError(f"{path}: exneat has a {name} of its own, which would be used instead; rename yours")
     directories = (*filter(None, [flags.config_path]), shipped, *flags.config_dir)
     read = [read_setting(text, directories, multirun=flags.multirun) for text in flags.settings]
     return CommandLine(
@@ -215,7 +215,7 @@ def _directory(text: str) -> Path:
 
 
 def in_words(error: BaseException, directories: Sequence[Path]) -> str:
-    """What Hydra, OmegaConf or YAML say, in one or two lines that name the file, the setting, or the known options."""
+    """An error of Hydra, OmegaConf or YAML in one or two lines that name the file, the setting or the known options."""
     error = error if str(error) else error.__cause__ or error
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
         group, _, option = str(error.missing_cfg_file).rpartition("/")
@@ -224,7 +224,7 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         if hint := nearest(option, files or error.options or ()):
             known += f"\n  {hint}"
         if group == "task":
-            return f"{known}\n  a class of your own goes by task=custom task.kind=package.module:Class"
+            return f"{known}\n  for a class of your own: task=custom task.kind=package.module:Class"
         return f"{known}\n  pip install 'exneat[joblib]' or 'exneat[slurm]' adds more" if "launcher" in group else known
     if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
         return f"{error.problem_mark.name}:{error.problem_mark.line + 1}: cannot be read as YAML: {error.problem}"
@@ -233,17 +233,17 @@ def in_words(error: BaseException, directories: Sequence[Path]) -> str:
         place = next((path for path in paths if error.object in path.read_bytes()), "a YAML file")
         return f"{place}: expected UTF-8 text, got the byte {error.object[error.start]:#04x}"
     if isinstance(error, RecursionError):
-        return "a YAML file leads back to itself through its defaults, or values do through ${...}"
+        return "a YAML file includes itself through its defaults, or values refer to themselves through ${...}"
     cause = error.__cause__
     if isinstance(cause, ConfigKeyError | ConfigAttributeError) and cause.parent_node is not None:
         return f"{cause.full_key}: unknown key; known here: {', '.join(map(str, cause.parent_node))}"
     if isinstance(error, ConfigCompositionException) and (found := re.match(r"Could not override '(\w+)'", str(error))):
         of_robots = "\n  recipes are for robots: task=ant, task=robot" if found[1] == "recipe" else ""
-        whose = "this command, or the task that was chosen,"
+        whose = "this command, or the chosen task,"
         return f"{found[1]}: expected nothing, since {whose} has no {found[1]} to choose{of_robots}"
     first = (str(error).strip() or type(error).__name__).splitlines()[0][:LONGEST]
     if key := getattr(error, "full_key", None):
         first = f"{key}: {first}"
     if isinstance(error, InterpolationKeyError):
-        first += "\n  a YAML file of your own that sets it begins with # @package _global_"
+        first += "\n  a YAML file of your own that sets it must begin with # @package _global_"
     return first

@@ -1,7 +1,7 @@
-"""`exneat completion bash|zsh|fish`: a script for the shell, and what it asks at each Tab.
+"""`exneat completion bash|zsh|fish`: a script for the shell, and the answers that it asks for at each Tab.
 
-The script asks `exneat completion <shell> <words typed so far>`, which has to answer while somebody waits: the YAML
-files are read here as they are, without Hydra.
+The script runs `exneat completion <shell> <words typed so far>`. Since the user waits for the answer, the YAML files
+are read directly, without Hydra.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from exneat_cli.commands.shipped import section_of, shipped_directory, shipped_f
 from exneat_cli.errors import check_choice
 
 SHELLS = ("bash", "zsh", "fish")
-HELP = """exneat completion: print what makes a shell complete commands, settings, options of groups and runs.
+HELP = """exneat completion: print a script that makes a shell complete commands, settings, options of groups and runs.
   bash: add to ~/.bashrc                      eval "$(exneat completion bash)"
   zsh:  add to ~/.zshrc, after compinit       eval "$(exneat completion zsh)"
   fish: exneat completion fish > ~/.config/fish/completions/exneat.fish
@@ -32,12 +32,12 @@ _FLAGS = ("--help", "--config-dir=", "--config-path=", "--config-name=", "--cfg"
 _NOT_TYPED = re.compile(r"^budgets\.|\.name$")
 """Settings that follow from the options of groups."""
 _MOST_ENTRIES = 2000
-"""So many entries of a directory are looked at for runs: nobody waits for a disk."""
+"""At most this many entries of a directory are searched for runs, so that the answer comes quickly."""
 _Words = Sequence[str]
 
 
 def run(words: _Words, commands: Collection[str]) -> int:
-    """Print the script for a shell, or if `words` go on with what was typed so far, what may come next, one a line.
+    """Print the script for a shell or, if `words` also holds what was typed so far, the completions, one per line.
 
     Raises:
         ExneatError: there is no script for that shell.
@@ -50,7 +50,7 @@ def run(words: _Words, commands: Collection[str]) -> int:
     if not typed:
         print((Path(__file__).parent / "completion_scripts" / f"exneat.{shell}").read_text("utf-8"), end="")
         return 0
-    # bash hands over the line, since its own words end at every "=".
+    # bash passes the whole line, since it splits words at every "=".
     _, *words, last = _split(typed[0]) if shell == "bash" else typed
     for found in _candidates(words, last, commands):
         print(found)
@@ -58,7 +58,7 @@ def run(words: _Words, commands: Collection[str]) -> int:
 
 
 def _split(line: str) -> list[str]:
-    """The words of a line that may end amid one, even amid quotes; the last is empty after a space."""
+    """The words of a line that may end within a word or within quotes; the last is empty after a space."""
     for ending in ("", "'", '"'):
         try:
             words = shlex.split(line + ending)
@@ -69,7 +69,7 @@ def _split(line: str) -> list[str]:
 
 
 def _candidates(words: _Words, last: str, commands: Collection[str]) -> Iterator[str]:
-    """What the `last` word may become, after the others; what goes on ends with "=" or "/"."""
+    """Completions of the `last` word after the others; those that can be continued end with "=" or "/"."""
     if not words:
         yield from _beginning(last, [*commands, "--help", "--version"])
         return
@@ -99,13 +99,13 @@ def _beginning(word: str, known: Sequence[str]) -> Iterator[str]:
 
 
 def _known(command: str, typed: _Words) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """The groups with their options, and every setting with its default, with the options that were `typed` so far."""
+    """The groups with their options, and every setting with its default, given the options `typed` so far."""
     folders = [shipped_directory("conf"), *_own_folders(typed)]
     chosen = dict(word.lstrip("+").split("=", 1) for word in typed if "=" in word)
     groups: dict[str, list[str]] = {}
     settings: dict[str, Any] = {}
     waiting = [command, *(["config"] if command in _OF_TRAINING else [])]
-    for name in waiting:  # which grows meanwhile
+    for name in waiting:  # which grows within the loop
         if path := yaml_file(folders, name):
             content, section = _read(path), section_of(name, path)
             for group, option in _groups(content.pop("defaults", [])):
@@ -124,7 +124,7 @@ def _own_folders(typed: _Words) -> Iterator[Path]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """A YAML file of sections; a user's own that is none has no settings to offer."""
+    """The sections of a YAML file; none if it cannot be read as such."""
     try:
         content = yaml.load(path.read_text("utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except (OSError, ValueError, yaml.YAMLError):
@@ -171,7 +171,7 @@ def _values(
 
 
 def _paths(typed: str, fits: Callable[[Path], bool]) -> Iterator[str]:
-    """Paths that begin as `typed`, of those that fit; a directory that is no run ends with "/"."""
+    """The fitting paths that begin with what was `typed`; a directory that is not a run ends with "/"."""
     parent, _, name = typed.rpartition("/")
     shown = f"{parent}/" if "/" in typed else ""
     try:
@@ -186,7 +186,7 @@ def _paths(typed: str, fits: Callable[[Path], bool]) -> Iterator[str]:
 
 
 def _leads_to_runs(path: Path, depth: int = 2) -> bool:
-    """Whether it is a run, or runs are in it or in one of its folders."""
+    """Whether a path is a run, or there are runs in it or in one of its folders."""
     if (path / "manifest.json").is_file():
         return True
     try:

@@ -1,6 +1,6 @@
-"""`exneat doctor`: whether this machine is fit for exneat, line by line, and what to do where it is not.
+"""`exneat doctor`: checks, line by line, whether exneat works on this machine, and says how to fix what does not.
 
-The checks import what they need themselves, so that a library that is missing or broken costs one line.
+Each check imports what it needs itself, so that a missing or broken library affects only its own line.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from exneat_cli.interruption import scratch_directory
 
 OK, DEGRADED, BROKEN = "ok", "degraded", "broken"
 LEAST = 1_000_000_000
-"""Bytes of memory, of which a small training of Ant takes half, and of disk, that should be left."""
+"""Bytes of memory (a small training of Ant takes half of them) and of disk space that should be free."""
 _ROOMS = ("exneat_cli.runs", "exneat_cli.analysis", "exneat_cli.commands.launching")
 """Importing these imports every other room and every library."""
 _PHYSICS = """
@@ -44,8 +44,8 @@ def step(model, data):
 
 step(model._address, data._address)
 if (data.qpos != expected.qpos).any():
-    raise SystemExit("compiled code steps MuJoCo otherwise than MuJoCo's own Python bindings")
-print(f"MuJoCo {mujoco.__version__} stepped from compiled code, as by its own bindings")
+    raise SystemExit("MuJoCo steps differently from compiled code and through its own Python bindings")
+print(f"MuJoCo {mujoco.__version__} steps from compiled code exactly as through its own bindings")
 """
 FRAME = """
 import os, mujoco
@@ -62,7 +62,7 @@ print(f"MuJoCo draws off-screen (MUJOCO_GL={os.environ.get('MUJOCO_GL', 'not set
 
 
 def run(line: CommandLine) -> int:
-    """Look at everything and print a line each; returns 1 if anything is broken, else 0.
+    """Run every check and print a line for each; returns 1 if anything is broken, else 0.
 
     Raises:
         ExneatError: an argument makes no sense.
@@ -72,24 +72,24 @@ def run(line: CommandLine) -> int:
     for name, look, worst, remedy in _checks(check_path("output", plain["output"])):
         try:
             state, found = OK, look()
-        except Exception as error:  # whatever is wrong with this machine is what we are asked for
+        except Exception as error:  # to find whatever is wrong is the purpose
             state, found = worst, str(error) if isinstance(error, ExneatError) else f"{type(error).__name__}: {error}"
         print(f"{state:<9} {name:<16} {found}".replace("\n", "\n" + " " * 27), flush=True)
         if state != OK:
             print(f"{'':<10}remedy: {remedy}")
         states.append(state)
         if name == "loading" and state != OK:
-            break  # the other checks are exneat's own code at work, and would only say the same again
-    conclusion = "is not fit for exneat until what is broken is fixed" if BROKEN in states else "is fit for exneat"
+            break  # the other checks use exneat's own code, and would only repeat this
+    conclusion = "cannot run exneat until what is broken is fixed" if BROKEN in states else "can run exneat"
     counts = ", ".join(f"{states.count(state)} {state}" for state in (OK, DEGRADED, BROKEN))
     print(f"\n{counts}: this machine {conclusion}.")
     return 1 if BROKEN in states else 0
 
 
 def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
-    """Name, what looks at it and says what it found, the state if that raises, and what helps then."""
-    install = "install exneat anew in an environment of its own, or what is named here alone"
-    place = "set output= to a directory on a disk that you can write to and that has locks"
+    """For each check: name, function that says what it found, state if that raises, and remedy."""
+    install = "reinstall exneat in an environment of its own, or only what is named here"
+    place = "set output= to a directory on a disk that is writable and supports file locks"
     egl = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and set MUJOCO_GL=egl; training needs no rendering"
     return [
         ("python", _versions, DEGRADED, install),
@@ -100,7 +100,7 @@ def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
         ("compile cache", _cache, DEGRADED, "set NUMBA_CACHE_DIR to a directory that you can write to"),
         ("output root", lambda: _output(output), BROKEN, place),
         ("memory", _memory, DEGRADED, "close other programs, or do one run at a time"),
-        ("disk space", lambda: _disk_space(output), DEGRADED, "make room, or set output= to another disk"),
+        ("disk space", lambda: _disk_space(output), DEGRADED, "free some space, or set output= to another disk"),
     ]
 
 
@@ -120,17 +120,17 @@ def _memory() -> str:
     from exneat_cli.records import provenance
 
     available = provenance.available_memory()
-    return "not told by this system" if available is None else _enough(available, "available")
+    return "not reported by this system" if available is None else _enough(available, "available")
 
 
 def _disk_space(output: Path) -> str:
-    return _enough(shutil.disk_usage(_nearest(output)).free, f"left for output={output}")
+    return _enough(shutil.disk_usage(_nearest(output)).free, f"free for output={output}")
 
 
 def _enough(found: int, what: str) -> str:
     said = f"{found / 1e9:.1f} GB {what}"
     if found < LEAST:
-        raise ExneatError(f"{said}, which is little")
+        raise ExneatError(f"{said}, which may not be enough")
     return said
 
 
@@ -140,14 +140,14 @@ def _rendering() -> str:
 
 
 def said_by(arguments: Sequence[str], seconds: float = 180.0, **environment: str) -> str:
-    """What Python says in a process of its own, which a driver or a library of another version may take down.
+    """What Python prints in a separate process, which a driver or an incompatible library may crash.
 
     Raises:
-        ExneatError: it failed, crashed, or took longer than that.
+        ExneatError: it failed, crashed, or took longer than `seconds`.
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-P", *arguments],  # -P: files of the working directory stand in for no library
+            [sys.executable, "-P", *arguments],  # -P: no file in the working directory may pass for a library
             env={**os.environ, **environment},
             capture_output=True,
             errors="replace",
@@ -157,7 +157,7 @@ def said_by(arguments: Sequence[str], seconds: float = 180.0, **environment: str
     except subprocess.TimeoutExpired:
         raise ExneatError(f"no answer within {seconds:g} s") from None
     if done.returncode < 0:
-        raise ExneatError(f"its process was ended by {signal.Signals(-done.returncode).name}")
+        raise ExneatError(f"its process was killed by {signal.Signals(-done.returncode).name}")
     if done.returncode:
         raise ExneatError(done.stdout.strip() or done.stderr.strip().split("\n")[-1] or f"exit code {done.returncode}")
     return done.stdout.strip()
@@ -168,22 +168,22 @@ def _cache() -> str:
 
     directory = cache_directory()
     if directory is None:
-        raise ExneatError(f"every start compiles anew: {cache_root()} cannot be written to")
+        raise ExneatError(f"exneat compiles anew at every start: {cache_root()} is not writable")
     with _trial(directory):
-        return f"{directory} can be written"
+        return f"{directory} is writable"
 
 
 def _output(output: Path) -> str:
     from exneat_cli.records import RunDirectory
 
     with _trial(output) as path, RunDirectory(path).held(), contextlib.suppress(ExneatError), RunDirectory(path).held():
-        raise OSError(f"output={output}: the file system grants a lock twice")
-    return f"output={output} can be {'written' if output.is_dir() else 'made'}, and keeps a second process out"
+        raise OSError(f"output={output}: the file system grants the same lock twice")
+    return f"output={output} can be {'written' if output.is_dir() else 'created'}, and a second process is kept out"
 
 
 @contextlib.contextmanager
 def _trial(place: Path) -> Iterator[Path]:
-    """A directory with a file as runs write it, in the place or the nearest above it that is there; gone at the end."""
+    """A temporary directory with a file written as runs do it, in the place or its nearest existing parent."""
     from exneat_cli.records import write_whole
 
     with scratch_directory(".exneat-doctor-", _nearest(place)) as path:

@@ -1,4 +1,4 @@
-"""Drawing the frames of films in processes of their own, the renderer that they need, and the film after training."""
+"""Drawing the frames of films in separate processes, the renderer that they need, and the film after training."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from exneat_cli.tasks import HasPicture, Task
 PORTION = 8
 """Frames that a process draws at a time."""
 SHORT = 200
-"""Control steps of a film that training makes."""
+"""Control steps of the film that is made after training."""
 
 
 def choose_renderer() -> None:
-    """Set MUJOCO_GL for processes to come, unless the user did, and try it out.
+    """Set MUJOCO_GL for later processes, unless the user did, and try it out.
 
     Raises:
-        ExneatError: MuJoCo can draw nothing here.
+        ExneatError: MuJoCo cannot draw on this machine.
     """
     given = os.environ.get("MUJOCO_GL")
     choices = [given] if given or sys.platform != "linux" else ["egl", "osmesa"]
@@ -48,14 +48,14 @@ def choose_renderer() -> None:
         if choice:
             os.environ["MUJOCO_GL"] = choice
         return
-    fix = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and leave MUJOCO_GL unset; exneat doctor tries it"
+    fix = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and leave MUJOCO_GL unset; exneat doctor tests it"
     raise ExneatError(
         f"watch: expected a renderer for MuJoCo, got none ({', '.join(map(str, choices))}): {why}\n  {fix}"
     )
 
 
 def film_champion(directory: RunDirectory) -> None:
-    """Film the champion of a finished run for its plots, the first `SHORT` steps, unless it was filmed before.
+    """Film the first `SHORT` steps of a finished run's champion for its plots, unless there is such a film.
 
     Raises:
         ExneatError: there is no renderer or no ffmpeg, or the task has no pictures.
@@ -71,7 +71,7 @@ def film_champion(directory: RunDirectory) -> None:
 
 
 class _Look(NamedTuple):
-    """How one scene looks, whatever the moment."""
+    """What stays the same throughout a scene."""
 
     task: Task
     champion: Champion | None
@@ -80,13 +80,13 @@ class _Look(NamedTuple):
 
 
 _Moment = tuple[Any, NDArray[np.float64], str]
-"""What was, the shares of nodes, and the caption."""
+"""The snapshot of the world, the shares of the nodes, and the caption."""
 
 
 def drawn(
     scenes: Sequence[Scene], size: tuple[int, int], with_panels: bool, workers: int
 ) -> Generator[NDArray[np.uint8]]:
-    """The frames in order, drawn by processes of their own; scenes that are over stay at their end.
+    """Yield the frames in order, drawn by separate processes; scenes that are over show their end.
 
     Raises:
         ExneatError: a process could not draw.
@@ -101,19 +101,19 @@ def drawn(
         waiting: list[Future[list[NDArray[np.uint8]]]] = []
         for portion in portions:
             waiting.append(pool.submit(_draw, portion))
-            if len(waiting) > 2 * workers:  # frames are large: no more of them than are needed soon
+            if len(waiting) > 2 * workers:  # frames are large: keep only those needed soon
                 yield from waiting.pop(0).result()
         for each in waiting:
             yield from each.result()
     except BrokenProcessPool as error:
-        raise ExneatError("watch: a process that drew frames died\n  exneat doctor tries the renderer") from error
+        raise ExneatError("watch: a process that draws frames died\n  exneat doctor tests the renderer") from error
     finally:
         over.set()
         pool.shutdown(cancel_futures=True)
 
 
 def frames_of(scenes: Sequence[Scene]) -> int:
-    """How many frames show all of the longest scene."""
+    """The number of frames of the longest scene."""
     return max(len(scene.snapshots) for scene in scenes)
 
 
@@ -128,8 +128,8 @@ _over: Any = None
 
 
 def _prepare(looks: Sequence[_Look], size: tuple[int, int], over: Event) -> None:
-    """Open cameras in a process that draws until it is `over`."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that began it hears it
+    """Open the cameras of a process, which draws until `over` is set."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles it
     from exneat_cli.analysis.film import BAR, Panel
 
     global _painter, _over

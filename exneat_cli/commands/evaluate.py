@@ -1,4 +1,4 @@
-"""`exneat evaluate`: how finished runs hold up when the world gets worse."""
+"""`exneat evaluate`: tests finished runs under perturbations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def run(line: CommandLine) -> int:
     """Test runs under perturbations; returns the exit code.
 
     Raises:
-        ExneatError: a run, a sweep or a level is unusable; nothing was run then.
+        ExneatError: a run, a sweep or a level is unusable; nothing is run then.
     """
     plain = line.compose_only(("run", "task", "sweeps"), ("sweep", "executor"))
     name_code_of_runs(line, plain)
@@ -33,14 +33,14 @@ def run(line: CommandLine) -> int:
         fitting = "threads" if is_compiled(job.settings.task) else "processes"
         executor = build(Executor, {"name": fitting, **where}, "executor.")
         tested = job.test(directory, executor, progress_for_terminal())
-        came = f"{directory.robustness}: {tested} levels tested now"
-        print(came if tested else f"{directory.path}: all there already")
+        came = f"{directory.robustness}: {tested} levels tested"
+        print(came if tested else f"{directory.path}: all levels were tested before")
         _print_levels(job, directory)
     return 0
 
 
 def _print_levels(job: Job, directory: RunDirectory) -> None:
-    """Print what the run reached at each level that was asked for, with the label and unit of each sweep."""
+    """Print the run's scores at each requested level, with the label and unit of each sweep."""
     rows = {(row.parameter, row.level, row.episodes): row for row in read_robustness(directory.robustness)}
     for sweep in job.sweeps:
         reached = [rows[sweep.name, float(level), job.episodes] for level in sweep.levels]

@@ -1,4 +1,4 @@
-"""`exneat export`: the champion of a finished run for use elsewhere."""
+"""`exneat export`: writes the champion of a finished run for use without exneat."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from exneat_cli.runs import load_champion, load_settings
 
 
 def run(line: CommandLine) -> int:
-    """Write champions in a format of `FORMATS`, each into the folder ``export`` of its run unless told otherwise.
+    """Write champions in a format of `FORMATS`, each into the folder ``export`` of its run unless ``output`` is set.
 
     Raises:
-        ExneatError: a run is unusable, or its champion does not fit the format; nothing was written then.
+        ExneatError: a run is unusable, or its champion does not fit the format; nothing is written then.
     """
     plain = line.compose_only(("run", "format", "output", "task"))
     name_code_of_runs(line, plain)
@@ -26,7 +26,7 @@ def run(line: CommandLine) -> int:
     if output is not None:
         output = check_path("output", output, "a file, or for format=neat a directory")
         if len(runs) > 1:
-            raise ConfigError("output", "null for several runs, each of which keeps its own", plain["output"])
+            raise ConfigError("output", "null for several runs, since each has its own file", plain["output"])
     loaded = [
         (directory, settings := load_settings(directory), load_champion(directory, settings)) for directory in runs
     ]

@@ -1,4 +1,4 @@
-"""What --help of a command shows: every key with its default and the comment that its YAML file has on it."""
+"""The text of a command's --help: every key with its default and its comment in the YAML file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LINE = re.compile(r"(?P<indent> *)(?P<item>- )?(?P<key>[\w/@.]+):(?P<value>.*?)
 _OPTIONAL = ("override", "optional")
 _COLUMN = 38
 _ALL = ("train", "sweep", "search")
-"""Commands that take whatever their composition holds; others take what their own file names."""
+"""Commands that accept every key of their composition; others accept only the keys in their own file."""
 
 
 def help_text(
@@ -23,10 +23,10 @@ def help_text(
     """Write the help of a command.
 
     Args:
-        command: its name, which is that of its own file.
-        files: the section that each YAML file of the composition fills (empty for all) and its path, its own first.
+        command: its name, also that of its YAML file.
+        files: the section that each YAML file fills (empty: all settings) and its path; the command's own file first.
         settings: the composition, as plain data.
-        choices: the option that is chosen of each group.
+        choices: the chosen option of each group.
     """
     comments: dict[str, str] = {}
     groups: dict[str, str] = {}
@@ -84,7 +84,7 @@ def _rows(settings: Mapping[str, Any], comments: Mapping[str, str], prefix: str 
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Key and comment side by side; a long one goes on below itself, and under a key without room beside it."""
+    """Key and comment side by side; long comments are wrapped, and begin on the next line beside a long key."""
     width = max(80, min(120, shutil.get_terminal_size().columns))
     for key, comment in rows:
         lines = textwrap.wrap(comment, width - _COLUMN - 2) or [""]

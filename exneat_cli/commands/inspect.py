@@ -1,6 +1,6 @@
 """`exneat inspect`: the list of runs, a run's wiring in words, or a task's parts before any run.
 
-Genomes and simulators take a second to import, which the list does without.
+The list does not import genomes and simulators, which would take a second.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _WITH_TASKS = (
     *("task", "algorithm", "linkage", "geometry", "evolution", "recipe", "wiring", "judging", "champion", "pairing"),
     *("budgets", "executor", "name"),
 )
-"""What a task's file and its recipe set; of all that, only the task is shown."""
+"""What a task's file and its recipe set; only the task itself is shown."""
 
 
 def run(line: CommandLine) -> int:
@@ -27,7 +27,7 @@ def run(line: CommandLine) -> int:
         ExneatError: an argument makes no sense, or the run has no champion to show.
     """
     plain = line.compose_only(("run", "output", "sort", "csv"), _WITH_TASKS)
-    check_text("sort", plain["sort"], "what to sort by")
+    check_text("sort", plain["sort"], "a column to sort by")
     if "task" in plain:
         from exneat_cli.commands.jobs import name_code
         from exneat_cli.commands.wiring_in_words import show_task
@@ -48,10 +48,10 @@ def run(line: CommandLine) -> int:
             show_run(found[0] if found else RunDirectory(pattern))
             return 0
         if not found:
-            fix = "exneat inspect without run= lists them"
-            raise ConfigError("run", "a run directory, or a pattern that fits some", plain["run"], fix)
+            fix = "exneat inspect without run= lists all runs"
+            raise ConfigError("run", "a run directory, or a pattern that matches some", plain["run"], fix)
     if not found:
-        print(f"No runs below {output}; exneat train makes one.")
+        print(f"No runs below {output}; exneat train creates one.")
         return 0
     runs = sorted_runs([ListedRun.read(each) for each in found], plain["sort"])
     if plain["csv"] is not None:
@@ -61,5 +61,5 @@ def run(line: CommandLine) -> int:
 
 
 def tell_unreadable(error: OSError) -> None:
-    """Name a folder that cannot be read, whose runs are missing then."""
+    """Name a folder that cannot be read, so that its runs are missing."""
     print(f"exneat: {error.filename}: cannot be read: {error.strerror}; runs in it are left out", file=sys.stderr)

@@ -20,7 +20,7 @@ from exneat_cli.runs import Finished, Progress, RunSettings, check_sweeps, is_fi
 from exneat_cli.tasks.user_code import NAMED, code_in
 
 _one_at_a_time = threading.Lock()
-"""Runs that train side by side take turns at drawing, which has one state for the whole process."""
+"""Runs that train side by side take turns at drawing, whose state is shared by the whole process."""
 BUDGETS = ("paper", "quick", "smoke")
 """What ``budget=`` may be, the largest first."""
 _SETTINGS = tuple(f.name for f in dataclasses.fields(RunSettings) if f.name != "task_kind")
@@ -48,10 +48,10 @@ class Job:
             return False
 
     def do(self, progress: Progress, command: Sequence[str], *, go_on: bool) -> Finished:
-        """Train, test and draw, as far as that is not done yet.
+        """Train, test and draw whatever is not done yet.
 
         Raises:
-            ExneatError: the run directory is unusable, or holds something else.
+            ExneatError: the run directory is unusable, or holds something else than this run.
         """
         with tracked(self.settings.trackers) as tracking:
             finished = train(self.settings, progress=progress, command=command, go_on=go_on, tracking=tracking)
@@ -63,7 +63,7 @@ class Job:
         return finished
 
     def _film(self, directory: RunDirectory) -> None:
-        """Film the champion, unless it was filmed before; whatever is missing for that costs a line, not the run."""
+        """Film the champion, unless that is done; if something needed is missing, a line says so."""
         try:
             film_champion(directory)
         except ExneatError as error:
@@ -71,7 +71,7 @@ class Job:
             print(f"exneat: {directory.path.name}: no video: {'; '.join(map(str.strip, why))}", file=sys.stderr)
 
     def resuming(self, words: Sequence[str]) -> str:
-        """The command that goes on with the run, ready to paste; a user's own task is named as in the `words` typed."""
+        """The command that resumes the run, ready to paste; a user's own task is named as in the `words` typed."""
         path = str(self.settings.directory.path)
         is_plain = all(character.isalnum() or character in "/._-" for character in path)
         typed = [word for word in words if word.startswith(("task.kind=", "task.env_id=", "sweep=", "sweep.levels="))]
@@ -79,7 +79,7 @@ class Job:
         return shlex.join(["exneat", "resume", f"run={path if is_plain else as_written(path)}", *typed, *episodes])
 
     def test(self, directory: RunDirectory, executor: Executor, progress: Progress) -> int:
-        """Test the finished run at the levels that are missing, and draw the figures that are; returns how many levels.
+        """Test the finished run at the missing levels and draw the missing figures; returns how many levels it tested.
 
         Raises:
             ExneatError: another process holds the directory, it is damaged, or a figure cannot be written.
@@ -91,7 +91,7 @@ class Job:
         return done
 
     def missing_figures(self, directory: RunDirectory) -> list[str]:
-        """Names of the figures that the finished run has data for, but no picture; of robustness also an older one."""
+        """Names of the figures that have data but no picture or, for robustness, an outdated one."""
         data = {"training": directory.history, "path": directory.trace, "network": directory.champion}
         plots = directory.plots
         missing = [name for name, path in data.items() if path.exists() and not (plots / f"{name}.svg").exists()]
@@ -123,7 +123,7 @@ class Job:
                 draw[name]()
 
     def trained_levels(self) -> dict[str, float]:
-        """What the setting of each sweep was in training, where that is one number."""
+        """The value that the setting of each sweep had in training, if it is a number."""
         plain, levels = self.settings.to_plain(), {}
         for sweep in self.sweeps:
             section, _, key = sweep.parameter.partition(".")
@@ -133,7 +133,7 @@ class Job:
 
 
 def name_code(line: CommandLine, plain: Mapping[str, Any]) -> None:
-    """Let what the settings of a task would import be imported, as far as the user named it himself."""
+    """Allow the import of the code that a task's settings refer to, as far as the user named it."""
     code = code_in(check_section("task", plain.get("task", {})))
     NAMED.update(reference for key, reference in code.items() if line.names(key))
 
@@ -148,14 +148,14 @@ def finished_runs(pattern: object) -> list[RunDirectory]:
     """The run directories that ``run=`` names.
 
     Raises:
-        ExneatError: it is no text, or a pattern that fits none.
+        ExneatError: it is not text, or a pattern that matches no run.
     """
     path = check_path("run", pattern, "a run directory, or a pattern such as 'outputs/ant/*'")
     if found := runs_at(path):
         return found
     if not glob.has_magic(str(path)):
-        return [RunDirectory(path)]  # whose reader says that it is not there
-    raise ConfigError("run", "a run directory, or a pattern that fits some", pattern, "exneat inspect lists them")
+        return [RunDirectory(path)]  # its reader says that it does not exist
+    raise ConfigError("run", "a run directory, or a pattern that matches some", pattern, "exneat inspect lists runs")
 
 
 def check_known(plain: Mapping[str, Any], others: Sequence[str] = ()) -> None:
@@ -164,7 +164,7 @@ def check_known(plain: Mapping[str, Any], others: Sequence[str] = ()) -> None:
 
 
 def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
-    """Compose the settings of a run, beside which `others` may be set, check them, and make a job of them.
+    """Compose and check the settings of a run, besides which `others` may be set, and make a job of them.
 
     Raises:
         ExneatError: a key is unknown or missing, a value is of the wrong type or out of range, or a sweep does not fit.
@@ -187,7 +187,7 @@ def read_job(name: str, line: CommandLine, others: Sequence[str] = ()) -> Job:
 
 
 def with_sweeps(name: str, settings: RunSettings, plain: Mapping[str, Any]) -> Job:
-    """The run of these settings, with the ``sweeps`` of a composed configuration, and what ``sweep`` sets for them all.
+    """The job of a run with these settings and a configuration's ``sweeps``, to all of which ``sweep`` applies.
 
     Raises:
         ExneatError: a key is unknown or missing, levels are out of range, or a sweep does not fit the task.

@@ -1,4 +1,4 @@
-"""Doing several jobs: here, one after the other or together on a GPU, or elsewhere by a launcher of Hydra's."""
+"""Doing several jobs: here, one after another or together on a GPU, or elsewhere by a Hydra launcher."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from exneat_cli.tasks.user_code import NAMED
 from exneat_cli.wiring import LINKAGES
 
 MOST_SIDE_BY_SIDE = 1024
-"""So many runs train at once on one GPU."""
+"""At most this many runs train at once on one GPU."""
 _REGISTRIES: tuple[Any, ...] = (TASKS, ALGORITHMS, LINKAGES, NAMED)
-"""What a program or its user may have added to, and a worker, which runs another program, must know too."""
+"""Registries to which a program or its user may have added; workers, which run another program, need the same."""
 _WRITING_NOTHING = (
     *("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null"),
     *("hydra.sweep.dir=.", "hydra.sweep.subdir=."),
 )
-"""Hydra would otherwise make directories, write files of its own there and open a log."""
+"""Without these, Hydra would make directories, write its own files there and open a log."""
 
 
 def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine) -> list[str]:
-    """Do `work` for each job; return why each failed, empty where it did not.
+    """Do `work` for each job; returns why each failed, empty if it did not.
 
     Args:
-        work: what is done; picklable if the command line names a launcher.
-        jobs: what it is done for.
+        work: what to do; picklable if the command line names a launcher.
+        jobs: for which to do it.
         line: names the launcher.
 
     Raises:
@@ -69,12 +69,12 @@ def run_jobs(work: Callable[[Job], None], jobs: Sequence[Job], line: CommandLine
 
 
 def side_by_side(jobs: Sequence[Job]) -> bool:
-    """Whether jobs that no launcher does run together here."""
+    """Whether jobs without a launcher run together here."""
     return all(job.settings.executor.name == "warp" for job in jobs)
 
 
 def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: Path) -> list[str]:
-    """Have a launcher do `task` for each of so many jobs, with a directory of this machine that workers lock."""
+    """Have a launcher do `task` for `count` jobs; workers lock `workplace`, a directory of this machine."""
     with replace(line, primary=None, settings=(*_WRITING_NOTHING, *line.launcher)).composed() as config:
         try:
             config.hydra.sweep.dir = os.path.expanduser(config.hydra.sweep.dir)
@@ -95,7 +95,7 @@ def _launch(task: Callable[..., str], count: int, line: CommandLine, workplace: 
 
 @contextlib.contextmanager
 def _importable() -> Iterator[None]:
-    """Let processes that are started meanwhile import what this one can, from its program's directory too."""
+    """Let processes started within the block import what this one can, also from its program's directory."""
     before = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
     try:
@@ -109,7 +109,7 @@ def _importable() -> Iterator[None]:
 def _do_here(
     directory: Path, known: Sequence[Any], task: Callable[[Mapping[str, int]], str], config: Mapping[str, int]
 ) -> str:
-    """Do one job in a worker; joblib keeps workers, which may have begun in another directory than this launch."""
+    """Do one job in a worker; joblib reuses workers, which may have begun in another directory."""
     os.chdir(directory)
     for registry, entries in zip(_REGISTRIES, known, strict=True):
         registry.update(entries)
@@ -117,7 +117,7 @@ def _do_here(
 
 
 def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None, config: Mapping[str, int]) -> str:
-    """Do one job, here or in a worker; return why it failed, for an error may not survive the way back."""
+    """Do one job, here or in a worker; returns why it failed, as text, since not every error can be sent back."""
     job = jobs[config["job"]]
     if signal_heard() is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
@@ -142,7 +142,7 @@ def _do(work: Callable[[Job], None], jobs: Sequence[Job], workplace: Path | None
 
 
 def _refuse_calls(node: Any, key: str) -> None:
-    """Refuse settings of Hydra's that would call something; its launchers are plug-ins, which it checks itself."""
+    """Refuse Hydra settings that would call something, except in launchers, plug-ins that Hydra checks itself."""
     children = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
     for name, child in children:
         if name in ("_target_", "()") and key not in (".hydra.launcher", ".hydra.sweeper"):

@@ -1,4 +1,4 @@
-"""A film in the browser: a page of this machine alone shows frames as soon as they are drawn, again and again."""
+"""A film in the browser: a page, for this machine only, that shows frames as soon as they are drawn, in a loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from exneat_cli.errors import ConfigError
 
 HOST = "127.0.0.1"
 PATIENCE = 60.0
-"""Seconds after which a browser that waits for a frame is told that there is none."""
+"""Seconds that a browser waits for a frame before it is told that there is none."""
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
 <meta charset="utf-8">
@@ -50,7 +50,7 @@ async function run() {
     const slow = setTimeout(() => { words.textContent = `frame ${k + 1} of ${last + 1} is being drawn`; }, 500);
     picture.src = `frames/${k}.jpg`;
     try { await Promise.race([picture.decode(), new Promise(done => { moved = done; })]); } catch {
-      words.textContent = "no answer: exneat watch has ended, or still draws";
+      words.textContent = "no answer: exneat watch has ended or is still drawing";
       await pause(1000);
       continue;
     } finally { clearTimeout(slow); }
@@ -77,7 +77,7 @@ class _Film:
         self.count, self._frames, self._changed = count, list[bytes](), threading.Condition()
 
     def add(self, frame: bytes) -> None:
-        """Hand on the next frame."""
+        """Add the next frame."""
         with self._changed:
             self._frames.append(frame)
             self._changed.notify_all()
@@ -90,13 +90,13 @@ class _Film:
 
 
 def show(frames: Generator[NDArray[np.uint8]], count: int, fps: float, port: int) -> None:
-    """Serve `count` frames to browsers on this machine, until it is interrupted.
+    """Serve `count` frames to browsers on this machine until interrupted.
 
     Args:
         frames: in order, (height, width, 3) each.
         count: how many there are.
-        fps: frames a second.
-        port: of `HOST`; 0 for any that is free.
+        fps: frames per second.
+        port: of `HOST`; 0 for any free port.
 
     Raises:
         ConfigError: the port is taken.
@@ -108,16 +108,16 @@ def show(frames: Generator[NDArray[np.uint8]], count: int, fps: float, port: int
     try:
         server = _Server((HOST, port), _handler_of(film))
     except OSError as error:
-        raise ConfigError("port", f"one that is free ({error.strerror})", port, "port=0 takes any") from error
+        raise ConfigError("port", f"one that is free ({error.strerror})", port, "port=0 picks a free one") from error
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    print(f"http://{HOST}:{server.server_address[1]} shows it until Ctrl-C", flush=True)
+    print(f"http://{HOST}:{server.server_address[1]} shows the film until Ctrl-C", flush=True)
     try:
         with closing(frames):
             for frame in frames:
                 film.add(as_jpeg(frame))
         threading.Event().wait()
-    except KeyboardInterrupt:  # the way to end it
-        print("exneat: the page has ended", flush=True)
+    except KeyboardInterrupt:  # the intended way to stop
+        print("exneat: the page was closed", flush=True)
     finally:
         server.shutdown()
         server.server_close()
@@ -125,7 +125,7 @@ def show(frames: Generator[NDArray[np.uint8]], count: int, fps: float, port: int
 
 class _Server(ThreadingHTTPServer):
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a browser that went away."""
+        """Do not report a browser that closed the connection."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -150,6 +150,6 @@ def _handler_of(film: _Film) -> type[BaseHTTPRequestHandler]:
             self.wfile.write(content)
 
         def log_message(self, *words: Any) -> None:
-            """Say nothing of every frame."""
+            """Do not log requests."""
 
     return Handler

@@ -13,7 +13,7 @@ from exneat_cli.records import PublishedRun, publish, published_run
 def publish_jobs(
     path: Path, budget: str, conditions: Sequence[str], variants: Sequence[str], jobs: Sequence[Job]
 ) -> None:
-    """Write the rows of finished jobs, called ``<condition>/<variant>/<seed>``; rows that are there stay as they are.
+    """Write the rows of finished jobs, called ``<condition>/<variant>/<seed>``; rows of other runs are kept.
 
     Several processes may do so at once.
 
@@ -35,6 +35,6 @@ def _row(job: Job, budget: str) -> PublishedRun:
 
 
 def _places(*named: tuple[str, Sequence[str]]) -> Iterable[tuple[int, str]]:
-    """The place of each name in its list; those that are not in it come last, by their letters."""
+    """The place of each name in its list; names that are not in it come last, in alphabetical order."""
     for name, known in named:
         yield (known.index(name) if name in known else len(known)), name

@@ -1,4 +1,4 @@
-"""`exneat report`: tables, figures and a page of them, from whatever runs there are; trains nothing."""
+"""`exneat report`: tables, figures and a page from the existing runs; trains nothing."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from exneat_cli.records import PublishedRun, find_runs, read_published, runs_at
 from exneat_cli.tasks import HasFullReward
 
 _OWN = ("experiment", "only", "axis", "columns", "style")
-"""Settings of the report that are none of its runs; conf/report.yaml explains them."""
+"""Settings of the report itself, not of its runs; conf/report.yaml explains them."""
 
 
 def run(line: CommandLine) -> int:
     """Build what can be built, and say what is missing; returns the exit code.
 
     Raises:
-        ExneatError: an argument makes no sense, there are no runs, or the one thing asked for lacks runs.
+        ExneatError: an argument makes no sense, there are no runs, or the requested figure or table lacks runs.
     """
     asked = line.compose("budget", "output", *_OWN)
     check_choice("axis", asked["axis"], AXES)
@@ -46,7 +46,7 @@ def run(line: CommandLine) -> int:
     experiments = {name: read_experiment(source) for name, source in sources.items()}
     rows: dict[str, list[PublishedRun]] = {name: [] for name in names}
     if own or any(_has_any(each, budget, asked["output"], ()) for each in experiments.values() for budget in BUDGETS):
-        # Published runs fill in what one's own lack; where there are none, a mistyped output= should say so.
+        # Published runs stand in for missing ones; without any run here, a mistyped output= must be reported.
         rows = {name: list(read_published(results_file(sources[name]))) for name in names}
     budgets = {
         name: asked["budget"] or _largest_budget(experiments[name], asked["output"], rows[name]) for name in names
@@ -67,7 +67,7 @@ def run(line: CommandLine) -> int:
     if asked["only"] is None:
         built += [build_comparison(study, directory) for study in studies.values() if study.reached]
         page = write_index(directory, studies, built, missing)
-        print(f"\n{len(built)} tables and figures built, {len(missing)} lack runs\n{page}")
+        print(f"\n{len(built)} tables and figures built, {len(missing)} not built for lack of runs\n{page}")
     return 0
 
 
@@ -78,7 +78,7 @@ def _build(
     asked: Mapping[str, Any],
     paper: Paper,
 ) -> tuple[list[Built], dict[str, str]]:
-    """Build what has its runs; returns that, and by name why the others could not be built."""
+    """Build whatever has its runs; returns what was built, and by name why the others could not be built."""
     built: list[Built] = []
     missing: dict[str, str] = {}
     for name, artefact in artefacts.items():
@@ -101,12 +101,12 @@ def _paper(asked: Mapping[str, Any]) -> Paper:
     if asked["columns"] not in (None, 1, 2):
         raise ConfigError("columns", "1 or 2, or null for figures to be read on a screen", asked["columns"])
     sheet = asked["style"]
-    own = {} if sheet is None else read_style_sheet(check_path("style", sheet, "a style sheet of matplotlib's"))
+    own = {} if sheet is None else read_style_sheet(check_path("style", sheet, "a matplotlib style sheet"))
     return Paper(asked["columns"], own)
 
 
 def _artefacts(asked: Mapping[str, Any], own: Experiment | None) -> dict[str, FigurePlan | TablePlan]:
-    """What is to be built: from the catalogue, or, for an experiment that is not in it, one figure for each thing."""
+    """What to build: entries of the catalogue or, for an experiment not in it, figures of each condition and sweep."""
     catalogue = read_catalogue(shipped_directory("experiments") / "catalogue.yaml")
     if own:
         shipped = asked["experiment"] in shipped_files("experiments")
@@ -134,20 +134,20 @@ def _experiments_of(artefact: FigurePlan | TablePlan) -> list[str]:
 
 
 def _command(source: str, budget: str, asked: Mapping[str, Any], line: CommandLine) -> str:
-    """The command that does what is missing of an experiment, which is a name or a YAML file."""
+    """The command that makes the missing runs of an experiment, given as a name or a YAML file."""
     others = [word for word in line.words[2:] if word.partition("=")[0] not in ("budget", "output", *_OWN)]
     return shlex.join(["exneat", "sweep", f"experiment={source}", f"budget={budget}", *_place(asked), *others])
 
 
 def _place(asked: Mapping[str, Any]) -> list[str]:
-    """What a command says of where runs are, unless that is the usual place."""
+    """The setting that says where runs are, unless that is the default place."""
     return [] if asked["output"] == "outputs" else [f"output={asked['output']}"]
 
 
 def study_of(
     experiment: Experiment, budget: str, command: str, line: CommandLine, rows: Sequence[PublishedRun]
 ) -> Study:
-    """The runs of an experiment, of which `rows` are published."""
+    """The runs of an experiment; `rows` are its published ones."""
     jobs = plan_jobs(experiment, budget, line, _OWN)
     task = jobs[0].settings.task
     runs = {}
@@ -178,7 +178,7 @@ def study_of(
 
 
 def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
-    """The level of each sweep at which all runs of a condition were trained, where that is one."""
+    """For each sweep, the level at which all runs of a condition were trained, if there is one such level."""
     levels: dict[str, set[float]] = {}
     for job in jobs:
         if job.name.partition("/")[0] == condition:
@@ -190,7 +190,7 @@ def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
 def _nothing_to_report(
     asked: Mapping[str, Any], sources: Mapping[str, Any], commands: Mapping[str, str]
 ) -> ExneatError:
-    """Say what there is instead, of other experiments or of none, and the commands for it."""
+    """The error that nothing can be reported; it names what exists instead, and commands for it."""
     found: dict[str, None] = {}
     alone = 0
     for run in find_runs(Path(asked["output"]), tell_unreadable):
@@ -207,12 +207,12 @@ def _nothing_to_report(
         reports = " or ".join(shlex.join(["exneat", "report", word, *_place(asked)]) for word in others[:3])
         return ExneatError(f"{nothing}  there are runs of another experiment: {reports}")
     listing = shlex.join(["exneat", "inspect", *_place(asked)])
-    compared = f"  there are runs of no experiment, which {listing} compares; those of one come from\n"
+    compared = f"  there are runs outside of experiments, which {listing} compares; to run an experiment:\n"
     return ExneatError(f"{nothing}{compared if alone else ''}  {next(iter(commands.values()))}")
 
 
 def _largest_budget(experiment: Experiment, output: str, rows: Sequence[PublishedRun]) -> str:
-    """The largest budget of which a run is finished here, else published, else the one to begin with."""
+    """The largest budget with a finished run here, else with a published one, else the one to begin with."""
     finished = [budget for budget in BUDGETS if _has_any(experiment, budget, output, ())]
     published = [budget for budget in BUDGETS if _has_any(experiment, budget, output, rows)]
     planned = [budget for budget in ("quick", *BUDGETS) if budget in experiment.runs]

@@ -1,4 +1,4 @@
-"""`exneat resume`: go on with a run by the settings in its own directory."""
+"""`exneat resume`: continues a run with the settings in its directory."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from exneat_cli.runs import progress_for_terminal, read_settings
 
 
 def run(line: CommandLine) -> int:
-    """Go on with ``run=<directory>``; returns the exit code.
+    """Continue ``run=<directory>``; returns the exit code.
 
     Raises:
         ExneatError: there is no such run, its settings cannot be read, or a setting makes no sense.
@@ -30,7 +30,7 @@ def run(line: CommandLine) -> int:
     place = str(directory.path.parent.parent)
     settings = replace(settings, resume=True, name=path.parent.name, output=place, **asked)
     if settings.directory.path.absolute() != path:
-        came = f"its settings belong into {settings.directory.path.name}"
+        came = f"its settings belong in {settings.directory.path.name}"
         raise ExneatError(f"run={directory.path}: is not where exneat puts such a run: {came}")
     job = with_sweeps("resume", settings, plain)
     tell(job.do(progress_for_terminal(), line.words, go_on=True))

@@ -12,16 +12,16 @@ from exneat_cli.errors import ConfigError, ExneatError, nearest
 from exneat_cli.records import NOT_HASHED, Manifest, RunDirectory, Score, dotted, read_yaml, write_csv
 
 MOST_SETTINGS = 8
-"""So many settings have a column on the screen; a CSV file has all of them."""
+"""At most this many settings have a column on the screen; a CSV file has all of them."""
 _OWN_COLUMNS = ("fitness", "seed", "status", "run")
 _NOT_COMPARED = {*NOT_HASHED, "seed"} - {"generations"}
-"""Settings without effect on results, and the seed, which has a column anyway."""
+"""Settings without effect on results, and the seed, which always has a column."""
 _Row = list[str]
 
 
 @dataclass(frozen=True)
 class ListedRun:
-    """A run with its settings by dotted name; without manifest and settings if they cannot be read."""
+    """A run with its settings by dotted name; manifest and settings are empty if they cannot be read."""
 
     directory: RunDirectory
     status: str
@@ -30,7 +30,7 @@ class ListedRun:
 
     @classmethod
     def read(cls, directory: RunDirectory) -> ListedRun:
-        """Read what there is of it."""
+        """Read as much of a run as can be read."""
         try:
             manifest = directory.read_manifest()
             settings = dotted(read_yaml(directory.config))
@@ -40,12 +40,12 @@ class ListedRun:
 
     @property
     def tested(self) -> Score | None:
-        """What its champion reached in the test episodes."""
+        """The score of its champion on the test episodes."""
         return self.manifest.result.champion if self.manifest and self.manifest.result else None
 
     @property
     def fitness(self) -> float | None:
-        """The mean of that."""
+        """The mean fitness of its champion on the test episodes."""
         return self.tested.fitness_mean if self.tested else None
 
     @property
@@ -54,14 +54,14 @@ class ListedRun:
         return self.manifest.seed if self.manifest else None
 
     def value_of(self, column: str) -> Any:
-        """What a column of the table holds, one of those that every run has or a setting."""
+        """The run's value in a column of the table, which is one that every run has or a setting."""
         if column in _OWN_COLUMNS:
             return str(self.directory.path) if column == "run" else getattr(self, column)
         return self.settings.get(column)
 
 
 def differing(runs: Iterable[ListedRun]) -> list[str]:
-    """Settings that have several values among runs, in the order of config.yaml; one that a run lacks is no value."""
+    """Settings in which runs differ, in the order of config.yaml; a missing setting does not count as a value."""
     values: dict[str, set[str]] = {}
     for run in runs:
         for key, value in run.settings.items():
@@ -71,7 +71,7 @@ def differing(runs: Iterable[ListedRun]) -> list[str]:
 
 
 def sorted_runs(runs: Sequence[ListedRun], column: str) -> list[ListedRun]:
-    """Runs in the order of a column, by fitness the best first; those that lack it come last.
+    """Runs in the order of a column, for fitness the best first; runs without a value come last.
 
     Raises:
         ConfigError: there is no such column.
@@ -86,7 +86,7 @@ def sorted_runs(runs: Sequence[ListedRun], column: str) -> list[ListedRun]:
 
 
 def _full_name(column: str, runs: Sequence[ListedRun]) -> str:
-    """The column that is meant: its name, or the end of a setting's dotted one."""
+    """The full name of a column, of which the user may type the end of a setting's dotted name."""
     settings = dict.fromkeys(key for run in runs for key in run.settings)
     meant = [key for key in settings if key == column or key.endswith(f".{column}") or key == f"{column}.name"]
     if column in (*_OWN_COLUMNS, *meant[:1]):
@@ -98,7 +98,7 @@ def _full_name(column: str, runs: Sequence[ListedRun]) -> str:
 
 
 def print_runs(runs: Sequence[ListedRun]) -> None:
-    """Print a table for each folder, since the runs in it are those that can be compared."""
+    """Print a table for each folder, since runs in one folder are meant to be compared."""
     folders: dict[Path, list[ListedRun]] = {}
     for run in runs:
         folders.setdefault(run.directory.path.parent, []).append(run)
@@ -112,7 +112,7 @@ def print_runs(runs: Sequence[ListedRun]) -> None:
             numbers=(1, 2),
         )
         if left_out:
-            print(f"Differing too: {', '.join(left_out)}; exneat inspect csv=FILE writes them all.")
+            print(f"They also differ in {', '.join(left_out)}; exneat inspect csv=FILE writes all of these.")
         if len(folders) > 1:
             print()
 
@@ -125,7 +125,7 @@ def _row(run: ListedRun, keys: Sequence[str]) -> _Row:
 
 
 def _short_names(keys: Sequence[str]) -> list[str]:
-    """The last part of dotted names, and the section of what it chooses by name; whole where that could be two."""
+    """The last part of dotted names (the section, for ``<section>.name``); the whole name where that is ambiguous."""
     short = [key.removesuffix(".name").rpartition(".")[2] for key in keys]
     return [name if short.count(name) == 1 else key for name, key in zip(short, keys, strict=True)]
 
@@ -135,7 +135,7 @@ def _written(value: object) -> str:
 
 
 def print_table(rows: Sequence[_Row], numbers: Sequence[int] = ()) -> None:
-    """Print rows of cells in columns, of which `numbers` are flush right; the first row is the heading."""
+    """Print rows of cells, with the columns `numbers` aligned to the right; the first row is the heading."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = [

@@ -1,7 +1,7 @@
-"""`exneat search`: trainings whose settings Optuna chooses by what earlier ones reached on the validation episodes.
+"""`exneat search`: trainings whose settings Optuna chooses from the validation fitness of earlier ones.
 
-What Optuna knows is in a SQLite file beside the runs. A trial's choice depends on the trials before it and on their
-number alone, so that a search that was killed goes on as if it had not been.
+Optuna's records are in a SQLite file beside the runs. The settings of a trial depend only on the trials before it and
+on their number, so a killed search continues as if nothing had happened.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from exneat_cli.records import RunDirectory, converted, make_directory, read_yam
 from exneat_cli.runs import Progress, train
 
 _OWN = ("space", "trials")
-"""Settings that are none of the trials'; conf/search.yaml explains them."""
+"""Settings of the search itself, not of its trials; conf/search.yaml explains them."""
 
 
 class Range(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Numbers from low to high, whole ones if both are; `log` draws their logarithm evenly."""
+    """Numbers from low to high, whole ones if both ends are; with `log`, their logarithm is drawn uniformly."""
 
     low: int | float
     high: int | float
@@ -42,17 +42,17 @@ class Range(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Space(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Settings of all trials, and by dotted name the range or the choices of each that is searched."""
+    """The range or choices of each searched setting, by dotted name; and the settings that all trials share."""
 
     space: dict[str, Range | list[bool | int | float | str]]
     settings: dict[str, Any] = {}
 
 
 def run(line: CommandLine) -> int:
-    """Do the trials that are missing, and say which was best; returns the exit code.
+    """Do the missing trials, and print the best; returns the exit code.
 
     Raises:
-        ExneatError: an argument makes no sense, Optuna is missing, another search goes on there, or a training failed.
+        ExneatError: an argument makes no sense, Optuna is missing, another search is running, or a training failed.
     """
     asked = line.compose(*_OWN)
     check_whole("trials", asked["trials"], 1)
@@ -76,8 +76,8 @@ def run(line: CommandLine) -> int:
     equals = sum(trial.value == best.value for trial in done)
     alone = f", the first of {equals} that reached it" if equals > 1 else ""
     where = f"trial {best.number}{alone}, {best.user_attrs['run']}"
-    print(f"\nbest of {len(done)}: validation {best.value:.6g}, {where}")
-    print("the same training elsewhere:")
+    print(f"\nbest of {len(done)} trials: validation fitness {best.value:.6g}, {where}")
+    print("to repeat this training elsewhere:")
     others = [word for word in line.words[2:] if word.partition("=")[0] not in (*_OWN, "name")]
     settings = [f"{key}={_typed(value)}" for key, value in (space.settings | best.params).items()]
     print(shlex.join(["exneat", "train", *settings, *others, f"name=best-{path.stem}"]))
@@ -100,14 +100,14 @@ def _texts(settings: Mapping[str, Any], line: CommandLine) -> tuple[str, ...]:
 
 
 def _trial(line: CommandLine, chosen: Mapping[str, Any], folder: str) -> Job:
-    """The training with the values that are chosen, which win over what the command line says of them."""
+    """The training with the chosen values, which take precedence over the command line."""
     is_named = any(text.lstrip("+").startswith("name=") for text in line.settings)
     named = () if is_named else _texts({"name": folder}, line)
     return read_job("", replace(line, settings=(*line.settings, *named, *_texts(chosen, line))), _OWN)
 
 
 def _study(folder: Path, first: Job, space: Space) -> Any:
-    """The study of this question in the folder's file; what was going on when its process ended is given up."""
+    """The study of these settings in the folder's file; trials that a killed process left open are marked failed."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
@@ -140,7 +140,7 @@ def _search(study: Any, space: Space, line: CommandLine, name: str, trials: int)
 
 
 def _typed(value: object) -> str:
-    """A value as somebody would type it."""
+    """A value as a user would type it."""
     return value if isinstance(value, str) and value.isidentifier() else as_written(value)
 
 

@@ -1,4 +1,4 @@
-"""Several jobs one after the other or side by side, and what is told of them: a line as each begins, and as it ends."""
+"""Doing several jobs one after another or side by side, with a line when each begins and when it ends."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Publish = Callable[[Sequence[Job]], None]
 
 
 def unfinished(jobs: Sequence[Job]) -> list[Job]:
-    """Those that are not done, tested and drawn; a damaged one is not."""
+    """The jobs that are not trained, tested and drawn; one with a damaged run is among them."""
     return [job for job in jobs if not job.is_finished() or job.missing_figures(job.settings.directory)]
 
 
 def do_jobs(
     jobs: Sequence[Job], pending: Sequence[Job], line: CommandLine, publish: Publish | None = None
 ) -> list[str]:
-    """Do the `pending` ones of `jobs`, and `publish` each when it is done.
+    """Do those of `jobs` that are `pending`, and `publish` each when it is done.
 
-    Returns why each of them failed, empty where it did not.
+    Returns why each of them failed, empty if it did not.
 
     Raises:
         ExneatError: see `run_jobs`.
@@ -43,20 +43,20 @@ def do_jobs(
 
 @dataclass
 class _Series:
-    """What all of the jobs share; a launcher's workers have a copy each."""
+    """What all jobs share; each of a launcher's workers has a copy."""
 
     names: list[str]
-    left: list[Job]  # without those that were found to be finished
-    pending: int  # how many had to be done in the beginning
+    left: list[Job]  # those not yet found to be finished
+    pending: int  # how many were to be done at the beginning
     began: float
-    words: tuple[str, ...]  # typed, for manifests
-    alone: bool  # whether each tells what it is doing
+    words: tuple[str, ...]  # as typed, for manifests
+    alone: bool  # whether each reports its own progress
     publish: Publish | None
 
     @contextlib.contextmanager
     def told(self) -> Iterator[None]:
-        """Tell now and then how many are done, where none of them tells what it is doing."""
-        progress = Progress(sys.stderr, doing=lambda: f"{self._count_done()} of {len(self.names)} runs done; the rest")
+        """Report now and then how many jobs are done, for jobs that do not report their own progress."""
+        progress = Progress(sys.stderr, doing=lambda: f"{self._count_done()} of {len(self.names)} runs done")
         progress.start("", len(self.names))
         try:
             yield
@@ -68,7 +68,7 @@ class _Series:
         return len(self.names) - len(self.left)
 
     def do(self, job: Job) -> None:
-        """Do one, with a line before it and one after it."""
+        """Do one job, with a line before it and one after it."""
         started, count = time.time(), len(self.names)
         counted = f"[{1 + self.names.index(job.name):>{len(str(count))}}/{count}] {job.name}"
         print(f"{counted} begins", flush=True)

@@ -1,8 +1,8 @@
 """One setting of a command line, written key=value.
 
-A value means the same in every command. One that Hydra's grammar cannot read is text as it stands, so that paths may
-hold brackets, quotes and letters of any script. What stands in quotes of its own, such as ``"name='3'"``, is text
-whatever it looks like, and so is what is given for a name or a path.
+A value means the same in every command. One that Hydra's grammar cannot read is taken as text, so that paths may
+contain brackets, quotes and letters of any script. A value with quotes of its own, such as ``"name='3'"``, is always
+text, and so is the value of a name or a path.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from hydra.errors import HydraException
 from exneat_cli.errors import ConfigError, ExneatError
 
 _OF_LAUNCHERS = ("launcher", "sweep.dir", "job.env_set")
-"""Settings of Hydra's own that a user may change; exneat writes and looks nowhere else."""
+"""Hydra's own settings that a user may change; exneat sets all others itself."""
 _TEXTS = {"name", "output", "run", "experiment", "only", "space", "style", "task.model", "task.env_id"}
-"""Settings that are names and paths: what is typed for them is text, also where it looks like a number or a list."""
+"""Settings that are names and paths: their values are text even if they look like a number or a list."""
 LONGEST = 300
-"""Characters of what somebody typed, or of what a library says, that a message repeats."""
+"""At most this many characters of what a user typed, or of a library's message, are repeated in ours."""
 
 
 def as_written(value: object) -> str:
-    """A value as Hydra's grammar writes it; text stands in quotes, so that it is taken as it is."""
+    """A value in Hydra's grammar; text is quoted, so that it stays text."""
     if isinstance(value, list):
         return f"[{','.join(map(as_written, value))}]"
     return QuotedString(value, Quote.single).with_quotes() if isinstance(value, str) else json.dumps(value)
@@ -39,10 +39,10 @@ def is_hydras(text: str) -> bool:
 
 
 def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = False) -> str:
-    """Return the setting as Hydra's composition takes it; an unknown key passes, for dataclasses know the nearest one.
+    """Return the setting as Hydra's composition takes it; unknown keys pass, since dataclasses name the nearest key.
 
     Raises:
-        ExneatError: it cannot be read, is not the user's to make, or has several values unless in a multirun.
+        ExneatError: it cannot be read, may not be set by the user, or has several values outside of a multirun.
     """
     readable, override = _parsed(text)
     key = override.key_or_group
@@ -53,27 +53,27 @@ def read_setting(text: str, directories: Sequence[Path], *, multirun: bool = Fal
     if override.is_sweep_override() and not (multirun and override.is_discrete_sweep() and not is_hydras(key)):
         raise ExneatError(
             f"{text}: expected one value, got several\n"
-            f"  exneat train -m goes through them (--multirun); a list is written {key}=[...], text in quotes"
+            f"  exneat train -m (--multirun) runs each of them; a list is written {key}=[...], text in quotes"
         )
     section, _, name = key.replace("/", ".").partition(".")
     if section == "hydra":
         if not name.startswith(_OF_LAUNCHERS):
-            fix = "hydra/launcher=, hydra.launcher.* and hydra.sweep.dir= are yours to set, output= says where runs go"
+            fix = "you may set hydra/launcher=, hydra.launcher.* and hydra.sweep.dir=; output= says where runs go"
             raise ExneatError(f"{text}: exneat sets hydra.{name} itself\n  {fix}")
         return readable
     if not any((directory / key).is_dir() for directory in directories):
         return f"++{readable.lstrip('+')}"
     if not override.is_sweep_override():
         value = override.value()
-        if isinstance(value, list) and key != "sweep":  # of which several may be chosen at once
-            raise ConfigError(key, "one option", value, f"exneat train -m {key}=... goes through several")
+        if isinstance(value, list) and key != "sweep":  # which takes several options at once
+            raise ConfigError(key, "one option", value, f"exneat train -m {key}=... runs several")
         if not isinstance(value, str | list):
             raise ConfigError(key, "the name of an option", value)
     return readable
 
 
 def _parsed(text: str) -> tuple[str, Override]:
-    """A setting that Hydra's grammar reads, and what it reads."""
+    """The setting in a form that Hydra's grammar reads, and the result."""
     parser = OverridesParser.create()
     key, separator, value = text.partition("=")
     quoted = f"{key}={as_written(value.strip())}"

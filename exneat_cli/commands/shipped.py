@@ -1,4 +1,4 @@
-"""Where the data is that comes with exneat, and which of several YAML files of a name counts."""
+"""Where exneat's own data is, and which of several YAML files of the same name is used."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def shipped_directory(name: str) -> Path:
 
 
 def shipped_files(folder: str) -> dict[str, Path]:
-    """The YAML files in a folder of data, by name; the catalogue of figures is none of the experiments."""
+    """The YAML files in a folder of data, by name, without the catalogue of figures, which is not an experiment."""
     return {path.stem: path for path in sorted(shipped_directory(folder).glob("*.yaml")) if path.stem != "catalogue"}
 
 
 def chosen_file(key: str, name: object, folder: str) -> Path:
-    """The YAML file that a setting names: one of `shipped_files`, or by its path one of the user's own.
+    """The YAML file that a setting names: one of `shipped_files`, or the user's own, by its path.
 
     Raises:
         ConfigError: there is no file of that name.

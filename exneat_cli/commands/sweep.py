@@ -1,4 +1,4 @@
-"""`exneat sweep`: experiments, which are variants x conditions x seeds, from a YAML file to all of their runs."""
+"""`exneat sweep`: experiments: all variants, conditions and seeds that a YAML file describes."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ _SET_HERE = {"seed", "name", "output", "resume", "sweep", "sweeps", "budget", "h
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the things compared, with the first variant or with `against`.
+    """One of the variants, compared with the first one or with `against`.
 
-    Without `runs` it has as many seeds as the experiment says.
+    Without `runs` it has the experiment's number of seeds.
     """
 
     label: str
@@ -58,7 +58,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Condition:
-    """One training condition, and the robustness sweeps that the runs of all variants but unswept ones go through."""
+    """One training condition, and the robustness sweeps of its runs, except those of unswept variants."""
 
     label: str
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -67,9 +67,9 @@ class Condition:
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """What experiments/<name>.yaml says; its first variant is the one that the others are compared with.
+    """The content of experiments/<name>.yaml; the first variant is the one with which the others are compared.
 
-    Settings are by dotted name, as on the command line; `runs` are the numbers of seeds 0, 1, 2, ... by budget.
+    Settings have dotted names, as on the command line; `runs` is the number of seeds (0, 1, 2, ...) of each budget.
     """
 
     name: str
@@ -129,7 +129,7 @@ def _experiment(name: str, content: Any) -> Experiment:
 
 
 def _check_labels(part: str, entries: Mapping[str, Any]) -> None:
-    """Refuse labels that nobody could tell apart in a figure."""
+    """Refuse labels that could not be told apart in a figure."""
     labels: dict[str, str] = {}
     for name, entry in entries.items():
         label = str(check_section(f"{part}.{name}", entry).get("label", "")).strip()
@@ -156,12 +156,12 @@ def _condition(key: str, entry: Any) -> Condition:
     check_text(f"{key}.label", condition.label)
     sweeps = condition.sweeps or []
     if not isinstance(sweeps, list) or not all(isinstance(sweep, str) for sweep in sweeps):
-        raise ConfigError(f"{key}.sweeps", "a list of names of sweeps", sweeps)
+        raise ConfigError(f"{key}.sweeps", "a list of sweep names", sweeps)
     return replace(condition, settings=_settings(f"{key}.settings", condition.settings))
 
 
 def _settings(key: str, values: Any) -> dict[str, Any]:
-    """Settings by dotted name; sections within sections are spelled out."""
+    """Settings by dotted name, with nested sections flattened."""
     flat = dotted(check_section(key, values))
     for name, value in flat.items():
         if re.split("[./]", name.lstrip("+~"))[0] in _SET_HERE:
@@ -172,7 +172,7 @@ def _settings(key: str, values: Any) -> dict[str, Any]:
 def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
     """Plan every run of an experiment: jobs called ``<condition>/<variant>/<seed>``, in this order.
 
-    The user's own settings in `line` are for all runs, and win; those called `others` are none of the runs.
+    The user's settings in `line` apply to all runs and take precedence; those named in `others` are not of runs.
 
     Raises:
         ExneatError: settings make no sense, in at least one of the runs.
@@ -205,10 +205,10 @@ def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Se
 
 
 def run(line: CommandLine) -> int:
-    """Do what is missing of an experiment; returns 0 if all of it is there at the end, else 1.
+    """Do the missing runs of an experiment; returns 0 if all runs are finished at the end, else 1.
 
     Raises:
-        ExneatError: the experiment or a setting makes no sense; nothing was run then.
+        ExneatError: the experiment or a setting makes no sense; nothing is run then.
     """
     asked = line.compose("experiment", "budget", "publish")
     if not asked["experiment"]:
@@ -226,7 +226,7 @@ def run(line: CommandLine) -> int:
     for job in pending:
         check_worlds(job.settings.task)
     before = len(jobs) - len(pending)
-    counted = f"{len(jobs)} runs, {before} of them finished before"
+    counted = f"{len(jobs)} runs, {before} of them already finished"
     print(f"{experiment.name}, budget {asked['budget']}: {counted}", flush=True)
     reasons = [""] * len(pending)
     try:
@@ -234,22 +234,22 @@ def run(line: CommandLine) -> int:
     except ExneatError as error:
         if signal_heard() is not None or not any(job.is_finished() for job in pending):
             raise
-        # A launcher gives up when one of its processes is killed: what was done by then counts.
+        # A launcher gives up when one of its processes is killed; what was done by then counts.
         print(f"exneat: {error}", file=sys.stderr)
     reasons = [reason or _unfinished_because(job) for job, reason in zip(pending, reasons, strict=True)]
     failed = {job.name: reason for job, reason in zip(pending, reasons, strict=True) if reason}
     done = len(pending) - len(failed)
     _print_means(jobs)
-    print(f"\n{experiment.name}: {done} runs done, {before} skipped as finished before, {len(failed)} failed")
+    print(f"\n{experiment.name}: {done} runs done, {before} skipped (already finished), {len(failed)} failed")
     for name, reason in failed.items():
         print(f"  {name}: {reason}", file=sys.stderr)
     if failed:
-        print("  the same command does what is missing", file=sys.stderr)
+        print("  run the same command again to do what is missing", file=sys.stderr)
     return 1 if failed else 0
 
 
 def _print_means(jobs: Sequence[Job]) -> None:
-    """Print what the variants reached, over their finished runs."""
+    """Print the test fitness of the variants over their finished runs."""
     reached: dict[str, list[float]] = {}
     for job in jobs:
         if job.is_finished():
@@ -269,7 +269,7 @@ def _unfinished_because(job: Job) -> str:
     try:
         manifest = directory.read_manifest()
     except ExneatError as error:
-        return str(error) if directory.is_there() else "it was not begun"
+        return str(error) if directory.is_there() else "it was not started"
     if manifest.status == DONE:
         return "it was trained, but not tested at every level"
     return manifest.error or f"it did not finish (status {manifest.status})"

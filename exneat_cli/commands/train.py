@@ -40,7 +40,7 @@ def run(line: CommandLine) -> int:
             print(f"exneat: {name or 'train'}: {error}", file=sys.stderr)
     pending = unfinished(jobs)
     if not line.launcher:
-        print(f"{len(jobs)} runs, {len(jobs) - len(pending)} of them finished before", flush=True)
+        print(f"{len(jobs)} runs, {len(jobs) - len(pending)} of them already finished", flush=True)
     failures += filter(None, do_jobs(jobs, pending, line))
     listed = [ListedRun.read(run) for job in jobs if (run := job.settings.directory).is_there()]
     if listed:
@@ -48,15 +48,15 @@ def run(line: CommandLine) -> int:
         print_runs(sorted_runs(listed, "fitness"))
     if failures:
         reason = failures[0].splitlines()[0]
-        raise ExneatError(f"at least one job of the multirun failed; the first:\n  {reason}")
+        raise ExneatError(f"at least one job of the multirun failed; the first reason:\n  {reason}")
     return 0
 
 
 def tell(finished: Finished) -> None:
-    """Say what one run wrote and learned."""
+    """Print what one run wrote and learned."""
     directory = finished.directory
     if not finished.trained_now:
-        print(f"{directory.path} is finished already; nothing was trained.")
+        print(f"{directory.path} is already finished; nothing was trained.")
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

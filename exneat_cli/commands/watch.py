@@ -1,4 +1,4 @@
-"""`exneat watch`: a film of champions in an episode, their networks beside them."""
+"""`exneat watch`: films champions in an episode, next to their networks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run(line: CommandLine) -> int:
     """Film the champions of runs, side by side, or show them in the browser; returns the exit code.
 
     Raises:
-        ExneatError: a run or a setting is unusable, or there is no renderer or no ffmpeg; nothing was written then.
+        ExneatError: a run or a setting is unusable, or there is no renderer or no ffmpeg; nothing is written then.
     """
     plain = line.compose_only((*_KEYS, "task", "sweeps"), ("sweep",))
     _check(plain)
@@ -34,7 +34,7 @@ def run(line: CommandLine) -> int:
     form, output = plain["format"], plain["output"]
     if not plain["live"]:
         if output is None and len(runs) > 1:
-            raise ConfigError("output", "a file, where several runs are watched together", output, "output=ants.mp4")
+            raise ConfigError("output", "a file, since several runs are watched together", output, "output=ants.mp4")
         check_video_library()
     if any(load_settings(directory).task.drawn_by_mujoco for directory in runs):
         choose_renderer()
@@ -78,7 +78,7 @@ def _check(plain: Mapping[str, Any]) -> None:
 
 
 def _sweep(plain: Mapping[str, Any], directory: RunDirectory) -> Sweep | None:
-    """The sweep with the one level that is watched."""
+    """The sweep, with the one level to watch."""
     names, level = check_section("sweeps", plain["sweeps"]), plain["level"]
     if not names:
         if level is not None:
@@ -93,7 +93,7 @@ def _sweep(plain: Mapping[str, Any], directory: RunDirectory) -> Sweep | None:
 
 
 def _stem(plain: Mapping[str, Any]) -> str:
-    """What the film is called in its run's folder: by what differs from the usual one."""
+    """The name of the film in its run's folder, made of what differs from the default film."""
     words = ["champion", *plain["sweeps"], plain["level"] if plain["sweeps"] else None]
     words += [f"seed{plain['seed']}" if plain["seed"] is not None else None]
     words += [f"episode{plain['episode']}" if plain["episode"] else None]

@@ -1,4 +1,4 @@
-"""Who senses and drives what, in words: of a finished run, or of a task before any run."""
+"""Who senses and drives what, in words: in a finished run, or in a task before any run."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def show_task(task: Task) -> None:
             vector = "does not fit"
         print(f"{name:<8}  {vector}")
     if len(task.parts) == 1:
-        print("One part: its module is all there is, so modules make no difference, and ExNEAT trains what NEAT does.")
+        print("The task has a single part, hence a single module, so ExNEAT trains the same network as NEAT.")
 
 
 def _filled(word: str, text: str) -> str:
@@ -49,7 +49,7 @@ def show_run(run: RunDirectory) -> None:
         ExneatError: there is no run, or it has no champion to show.
     """
     if not run.is_there():
-        raise ExneatError(f"run={run.path}: no run is there; exneat inspect without run= lists them")
+        raise ExneatError(f"run={run.path}: there is no such run; exneat inspect without run= lists all runs")
     manifest = run.read_manifest()
     if not run.champion.exists():
         why = "a baseline has no networks" if manifest.variant in BASELINES else "it is not finished"

@@ -120,7 +120,7 @@ class Progress:
         while not over.wait(max(0.01, self._spoke + LONGEST_SILENCE - time.perf_counter())):
             if time.perf_counter() - self._spoke >= LONGEST_SILENCE:
                 since = timedelta(seconds=round(time.perf_counter() - self._began))
-                self.say(f"{self._doing()} goes on, {since} since the start")
+                self.say(f"{self._doing()}, still running, {since} since the start")
 
 
 def bar_on(console: Console) -> Bar:

@@ -42,7 +42,7 @@ def read_settings(directory: RunDirectory) -> RunSettings:
         ExneatError: there is no run, it is of another format, or its configuration is damaged.
     """
     if not directory.is_there():
-        raise ExneatError(f"run={directory.path}: no run is there; exneat inspect without run= lists them")
+        raise ExneatError(f"run={directory.path}: there is no such run; exneat inspect without run= lists all runs")
     manifest = directory.read_manifest()
     try:
         plain = dict(read_yaml(directory.config))

@@ -48,11 +48,11 @@ NO_TASK = {
     "unknown_section": (TASK + b"wurst: 3\n", "wurst: unknown key"),
     "wrong_type": (size(b"  size: [7]\n"), "task.size: expected a whole number from 5 to 99, got [7]"),
     "a_date": (size(b"  size: 2020-01-01\n"), "task.size: expected a whole number from 5 to 99, got '2020-01-01'"),
-    "leads_back": (evolution(b"leads_back"), "leads back to itself"),
+    "leads_back": (evolution(b"leads_back"), "includes itself"),
     "default_of_nothing": (evolution(b"/evolution: nowhere"), "evolution=nowhere: no such option; known: feed_forward"),
     "default_number": (evolution(b"3"), "Unsupported type in defaults"),
     "budget": (TASK.replace(b"population: 6", b"popluation: 6"), "population: Interpolation key"),
-    "ant": (TASK, "exneat has a task/ant.yaml of its own, which would be taken instead; rename yours"),
+    "ant": (TASK, "exneat has a task/ant.yaml of its own, which would be used instead; rename yours"),
 }
 
 

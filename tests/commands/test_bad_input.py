@@ -41,7 +41,7 @@ TRAIN = {
     "seed=": "seed: expected",
     "seed==3": "seed: expected a whole number from 0 to 18446744073709551615, got '=3'",
     "seed.x=1": "seed: expected",
-    "seed=1,2": "seed=1,2: expected one value, got several\n  exneat train -m goes through them",
+    "seed=1,2": "seed=1,2: expected one value, got several\n  exneat train -m (--multirun) runs each of them",
     "'seed=choice(1,2)'": "expected one value, got several",
     "seed=99999999999999999999999999999999999999": "seed: expected",
     "generations=0": "generations: expected a whole number of at least 1, got 0",
@@ -49,7 +49,7 @@ TRAIN = {
     "judging=first": "judging: expected one of last, mean",
     "champion=lucky": "champion: expected one of race, thesis",
     "recipe=running": "recipe=running: no such option; known: thesis, walking",
-    "task=hunting recipe=thesis": "recipe: expected nothing, since this command, or the task that was chosen,",
+    "task=hunting recipe=thesis": "recipe: expected nothing, since this command, or the chosen task,",
     "linkage=hidden": "recipe=thesis has hidden nodes",
     "linkage=feedback wiring.central=false": "wiring.central=true",
     "linkage=hidden evolution.module_hidden=0": "evolution.module_hidden",
@@ -155,18 +155,18 @@ OTHERS = {
     "fly": "fly: expected a command, one of train",
     "trian": "did you mean train?",
     "'\x1b[31mfly'": "fly: expected a command",
-    "inspect run=nowhere": "run=nowhere: no run is there",
+    "inspect run=nowhere": "run=nowhere: there is no such run",
     "inspect run=": "run: expected a run directory",
     "inspect outptu=x": "did you mean output?",
     "doctor output=": "output: expected a directory",
     "doctor run=outputs": "run: unknown key (value 'outputs')\n  known here: output",
-    "doctor -m": "-m: exneat train alone goes through several values",
+    "doctor -m": "-m: only exneat train accepts several values",
     "evaluate sweep=gap": "run: expected a run directory",
-    "evaluate run=nowhere sweep=gap": "run=nowhere: no run is there",
-    "evaluate run=a_file sweep=gap": "run=a_file: no run is there",
+    "evaluate run=nowhere sweep=gap": "run=nowhere: there is no such run",
+    "evaluate run=a_file sweep=gap": "run=a_file: there is no such run",
     "evaluate run=x sweep=sensor_nose": "did you mean sensor_noise?",
     "evaluate run=no*thing sweep=gap": "run: expected a run directory, or a pattern",
-    "evaluate run=[a sweep=gap": "run: expected a run directory, or a pattern that fits some, got '[a'",
+    "evaluate run=[a sweep=gap": "run: expected a run directory, or a pattern that matches some, got '[a'",
     "evaluate --what sweep=gap": "--what: unknown flag",
     "report": "output=outputs: no finished run of ant",
     "report budget=huge": "budget=huge: no such option; known: paper, quick, smoke",
@@ -220,7 +220,7 @@ def test_an_output_that_cannot_be_made_is_refused(
     dangling = "link: expected a directory, got a link that leads nowhere, to nowhere"
     check_refusal([*train, "output=link"], [f"exneat: {dangling}"], tmp_path, capfd)
     check_refusal([*train, f"output={long}"], ["File name too long"], tmp_path, capfd)
-    check_refusal(["inspect", f"run={long}"], ["no run is there"], tmp_path, capfd)
+    check_refusal(["inspect", f"run={long}"], ["there is no such run"], tmp_path, capfd)
     if os.getuid() == 0:
         check_refusal([*train, "output=/proc/exneat"], ["/proc/exneat"], tmp_path, capfd)
     else:
@@ -285,7 +285,7 @@ def test_a_value_means_the_same_in_every_command_whatever_its_characters(
     evaluate = ["evaluate", "sweep=gap", "sweep.levels=[1]", "sweep.episodes=1"]
     for fitting in (run.name, "*"):
         assert main([*evaluate, f"run={output.removesuffix(quote)}/track_maze/{fitting}{quote}"]) == 0
-    assert "robustness.csv: 1 levels tested now" in capfd.readouterr().out
+    assert "robustness.csv: 1 levels tested" in capfd.readouterr().out
     check_refusal(["report", f"output={output}"], [place, "no finished run of ant"], tmp_path, capfd)
 
 

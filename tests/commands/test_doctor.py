@@ -40,12 +40,12 @@ def test_a_sound_machine_gets_a_line_for_everything_and_keeps_no_trace(ask: Ask,
     assert code == 0
     assert list(states) == [*CHECKS, "disk space"]
     assert set(states.values()) == {"ok"}
-    assert said.endswith("9 ok, 0 degraded, 0 broken: this machine is fit for exneat.\n")
+    assert said.endswith("9 ok, 0 degraded, 0 broken: this machine can run exneat.\n")
     assert not list(tmp_path.iterdir())
 
 
 def test_this_very_machine_steps_mujoco_from_compiled_code() -> None:
-    assert "stepped from compiled code" in doctor.said_by(["-c", doctor._PHYSICS])
+    assert "steps from compiled code" in doctor.said_by(["-c", doctor._PHYSICS])
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_every_run_of_a_pattern_is_tested_at_every_level(runs: Path, capsys: pyt
     capsys.readouterr()
     assert evaluate(f"run={runs}/*", "sweep=[sensor_noise,gap]") == 0
     told = capsys.readouterr().out
-    assert told.count("all there already") == 4
+    assert told.count("all levels were tested before") == 4
     for row in rows_of(runs, "neat"):
         assert re.search(rf"^ *{row.level:g}  +{row.fitness_mean:.4g}  +{row.fitness_std:.3g}$", told, re.MULTILINE)
     assert {path: path.read_bytes() for path in runs.rglob("robustness.csv")} == before
@@ -127,7 +127,7 @@ BAD = {
     "sweep=sensor_noise sweep.level=[1]": "sweep.level: unknown key (value [1])\n  did you mean sweep.levels?",
     "sweep=sensor_noise sweep.episodes=0": "sweep.episodes: expected",
     "sweep=sensor_noise seed=1": "seed: unknown key",
-    "sweep=sensor_noise budget=smoke": "budget: expected nothing, since this command, or the task that was chosen,",
+    "sweep=sensor_noise budget=smoke": "budget: expected nothing, since this command, or the chosen task,",
     "sweep=sensor_noise executor.workers=-1": "executor.workers: expected",
     "sweep=gap executor.foo=1": "executor.foo: unknown key",
 }

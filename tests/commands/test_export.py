@@ -91,8 +91,8 @@ def test_runs_without_a_champion_or_with_one_that_does_not_fit_are_refused(
         (copy / "champion.json").write_text(json.dumps(content | change))
     for arguments, named in {
         "": "run: expected a run directory, or a pattern",
-        f"run={tmp_path}/none": "no run is there",
-        f"run={tmp_path}/none*": "run: expected a run directory, or a pattern that fits some",
+        f"run={tmp_path}/none": "there is no such run",
+        f"run={tmp_path}/none*": "run: expected a run directory, or a pattern that matches some",
         f"run={run_of(runs, 'random')}": "has no champion: random is a baseline",
         f"run={linked} format=neat": f"{linked}: format=neat: expected modules that do not read each other",
         f"run={old}": "champion.json: expected format 3, got 2: another version of exneat wrote it",

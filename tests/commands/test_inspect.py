@@ -38,7 +38,7 @@ def test_a_multirun_counts_its_runs_and_ends_with_one_table_of_what_differs_best
 ) -> None:
     output, printed = multirun
     lines = printed.splitlines()
-    assert lines[0] == "8 runs, 0 of them finished before"
+    assert lines[0] == "8 runs, 0 of them already finished"
     assert lines[1] == "[1/8] seed=0 noise.sensor_std=0.0 task.size=7 begins"
     assert lines[2].startswith("[1/8] seed=0 noise.sensor_std=0.0 task.size=7: fitness ")
     assert "1 of 8 done" in lines[2]

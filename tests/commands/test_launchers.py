@@ -63,7 +63,7 @@ def test_submitit_trains_the_same_and_says_why_a_job_failed(tmp_path: Path) -> N
     elsewhere = ["hydra/launcher=submitit_local", f"hydra.sweep.dir={tmp_path / 'jobs'}"]
     done = run("train", "-m", *elsewhere, *common, f"output={tmp_path / 'there'}", "task.gap=0,-1")
     assert done.returncode == 2
-    assert "at least one job of the multirun failed; the first:\n  task.gap: expected" in done.stderr
+    assert "at least one job of the multirun failed; the first reason:\n  task.gap: expected" in done.stderr
     assert list((tmp_path / "jobs" / ".submitit").rglob("*_log.out"))
     (here,), (there,) = ((tmp_path / place).glob("*/*/champion.json") for place in ("here", "there"))
     assert here.read_bytes() == there.read_bytes()
@@ -81,7 +81,7 @@ def test_slurm_is_asked_for_what_was_set_and_its_jobs_train_the_same(tmp_path: P
     slurm = ["hydra/launcher=submitit_slurm", "hydra.launcher.partition=long", "hydra.launcher.timeout_min=240"]
     place = [f"hydra.sweep.dir={tmp_path / 'jobs'}", f"output={tmp_path / 'there'}"]
     done = run(*common, *slurm, *place, PATH=f"{commands}:{os.environ['PATH']}")
-    told = [line for line in done.stderr.splitlines() if "2 runs done; the rest goes on" not in line]  # every 30 s
+    told = [line for line in done.stderr.splitlines() if "2 runs done, still running" not in line]  # every 30 s
     assert (done.returncode, told) == (0, [])
     submitted = (commands / "submitted").read_text()
     assert "#SBATCH --partition=long" in submitted

@@ -65,7 +65,7 @@ def test_every_id_builds_from_smoke_runs_which_stay_as_they_are(
         kinds = ("csv", "md", "tex") if name.startswith("table") else ("png", "svg", "pdf")
         assert {f"{name}.{kind}" for kind in kinds} <= set(made), f"{name}: {shown.err}"
     assert "index.html" in made
-    assert "0 lack runs" in shown.out
+    assert "0 not built for lack of runs" in shown.out
     assert {path: data for path, data in contents(outputs).items() if not path.startswith("report")} == before
 
 

@@ -43,6 +43,6 @@ def test_a_run_that_is_not_there_and_a_task_that_is_not_named_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["resume", f"run={tmp_path}"]) == 2
-    assert "no run is there" in capsys.readouterr().err
+    assert "there is no such run" in capsys.readouterr().err
     assert main(["resume"]) == 2
     assert "run: expected a run directory" in capsys.readouterr().err

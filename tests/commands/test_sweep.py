@@ -74,7 +74,7 @@ def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing
     swept: tuple[Path, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, printed = swept
-    assert "4 runs done, 0 skipped as finished before, 0 failed" in printed
+    assert "4 runs done, 0 skipped (already finished), 0 failed" in printed
     folders = sorted(path.name for path in (folder / "out").iterdir())
     assert folders == ["small-clean-smoke", "small-gap_1-smoke"]
     for run in (folder / "out").glob("*/*"):
@@ -84,7 +84,7 @@ def test_all_jobs_are_trained_tested_and_drawn_and_a_second_call_changes_nothing
         assert {path.stem for path in (run / "plots").glob("*.svg")} == drawn
     before = contents(folder / "out")
     assert sweep(folder) == 0
-    assert "0 runs done, 4 skipped as finished before, 0 failed" in capsys.readouterr().out
+    assert "0 runs done, 4 skipped (already finished), 0 failed" in capsys.readouterr().out
     assert contents(folder / "out") == before
 
 
@@ -99,12 +99,12 @@ def test_a_job_that_fails_leaves_the_others_alone_and_is_named_at_the_end(
     spoilt.write_text("in the way")
     assert sweep(tmp_path) == 1
     shown = capsys.readouterr()
-    assert "3 runs done, 0 skipped as finished before, 1 failed" in shown.out
+    assert "3 runs done, 0 skipped (already finished), 1 failed" in shown.out
     assert shown.err.splitlines()[-2].startswith(f"  {jobs[1].name}: {spoilt}: expected a directory, got a file")
     assert [job.is_finished() for job in jobs] == [True, False, True, True]
     spoilt.unlink()
     assert sweep(tmp_path) == 0
-    assert "1 runs done, 3 skipped as finished before, 0 failed" in capsys.readouterr().out
+    assert "1 runs done, 3 skipped (already finished), 0 failed" in capsys.readouterr().out
 
 
 def test_a_run_that_was_trained_but_not_tested_is_finished_without_training_again(finished: Path) -> None:
@@ -159,7 +159,7 @@ def test_damage_in_one_run_leaves_the_others_finished_and_is_named(
     manifest.write_text("{")
     assert sweep(finished) == 1
     shown = capsys.readouterr()
-    assert "0 runs done, 3 skipped as finished before, 1 failed" in shown.out
+    assert "0 runs done, 3 skipped (already finished), 1 failed" in shown.out
     assert "gap_1/neat/0" in shown.err
     assert "expected JSON" in shown.err
 
@@ -181,7 +181,7 @@ def test_side_by_side_a_failure_is_named_with_its_reason(tmp_path: Path, capsys:
     spoilt.write_text("in the way")
     assert sweep(tmp_path, "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "executor=serial") == 1
     shown = capsys.readouterr()
-    assert "1 runs done, 0 skipped as finished before, 1 failed" in shown.out
+    assert "1 runs done, 0 skipped (already finished), 1 failed" in shown.out
     assert f"  {jobs[1].name}: {spoilt}: expected a directory, got a file" in shown.err
 
 
@@ -218,8 +218,8 @@ NONSENSE = [
     ({"variants": {k: {"label": k, "settings": {}} for k in "ab"}}, "clean/a/0 and clean/b/0 are the same run"),
     (condition(settings={"task.gap": 99}), "small, a, exneat: task.gap: expected"),
     (condition(settings={"task.gap": datetime.date(2020, 1, 1)}), "task.gap: expected"),
-    (condition(sweeps="gap"), "conditions.a.sweeps: expected a list of names of sweeps, got 'gap'"),
-    (condition(sweeps=[1]), "conditions.a.sweeps: expected a list of names of sweeps"),
+    (condition(sweeps="gap"), "conditions.a.sweeps: expected a list of sweep names, got 'gap'"),
+    (condition(sweeps=[1]), "conditions.a.sweeps: expected a list of sweep names"),
     (condition(sweeps=["p_m"]), "fits task=track_maze"),
     (condition(sweeps=["wind"]), "sweep=wind: no such option"),
     ({"runs": {}}, "runs: expected at least one entry"),
@@ -268,7 +268,7 @@ def test_settings_may_be_left_out_and_a_report_names_the_experiment_that_there_a
     capsys.readouterr()
     assert main(["report", "experiment=ant", alone]) == 2
     assert capsys.readouterr().err.splitlines()[1:] == [
-        f"  there are runs of no experiment, which exneat inspect {alone} compares; those of one come from",
+        f"  there are runs outside of experiments, which exneat inspect {alone} compares; to run an experiment:",
         f"  exneat sweep experiment=ant budget=quick {alone}",
     ]
     folder = tmp_path / "alone" / f"ant-{next(iter(read_experiment('ant').conditions))}-quick"

@@ -179,7 +179,7 @@ def test_ctrl_c_and_sigterm_mark_the_run_interrupted_and_say_how_to_go_on(
     _, error = process.communicate(timeout=30)
     assert process.returncode == code
     assert error.strip().splitlines()[-2:] == [
-        "exneat: interrupted; to go on:",
+        "exneat: interrupted; to continue:",
         f"exneat resume run={the_run(tmp_path)}",
     ]
     assert "Traceback" not in error

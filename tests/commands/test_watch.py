@@ -207,7 +207,7 @@ def test_a_page_of_this_machine_shows_the_frames_until_it_is_interrupted(runs: P
             assert main(["watch", f"run={run}", "live=true", f"port={port}", "steps=1", "workers=1"]) == 2
         finally:
             process.send_signal(signal.SIGINT)
-        assert (process.stdout.read(), process.stderr.read()) == ("exneat: the page has ended\n", "")
+        assert (process.stdout.read(), process.stderr.read()) == ("exneat: the page was closed\n", "")
     assert process.returncode == 0
 
 
@@ -286,7 +286,7 @@ def test_what_cannot_be_filmed_is_refused(
     for arguments, named in {
         f"run={run_of(runs, 'foraging/random-*')}": "has no champion: random is a baseline",
         f"run={old}": "expected format 3, got 2: another version of exneat",
-        f"run={runs}/foraging/exneat-*": "output: expected a file, where several runs",
+        f"run={runs}/foraging/exneat-*": "output: expected a file, since several runs",
     }.items():
         check_refusal(["watch", *arguments.split()], [named], runs, capfd)
 

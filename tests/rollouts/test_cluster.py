@@ -173,6 +173,6 @@ def test_a_signal_to_all_processes_ends_them_all_and_the_last_line_goes_on(
     _, error = started.communicate(timeout=60)
     assert started.returncode == code
     shown = [line for line in error.splitlines() if not line.startswith("exneat-")]
-    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to go on:", "exneat resume run"]
+    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to continue:", "exneat resume run"]
     assert not psutil.wait_procs(children, timeout=10)[1]
     assert [path.name for path in tmp_path.iterdir()] == ["general_maze"]

@@ -142,7 +142,7 @@ def test_a_signal_ends_all_processes_and_the_last_lines_say_how_to_go_on(
     _, error = process.communicate(timeout=5)
     assert process.returncode == code
     shown = [line for line in error.splitlines() if not line.startswith("exneat-")]
-    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to go on:", "exneat resume run"]
+    assert [line.partition("=")[0] for line in shown] == ["exneat: interrupted; to continue:", "exneat resume run"]
     assert not psutil.wait_procs(children, timeout=2)[1]
 
 
