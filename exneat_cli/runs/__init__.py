@@ -1,4 +1,4 @@
-"""The story of a run: training, validation, test, robustness. Works from plain objects, without Hydra."""
+"""The course of a run: training, validation, test, robustness. Works from plain objects, without Hydra."""
 
 from exneat_cli.runs.progress import Progress, progress_for_terminal
 from exneat_cli.runs.robustness import (

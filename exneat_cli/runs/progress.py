@@ -1,4 +1,4 @@
-"""How a run tells what it is doing: a live bar on a terminal, a line now and then elsewhere."""
+"""How a run reports its progress: a live bar on a terminal, a line now and then elsewhere."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ LONGEST_SILENCE = 30.0
 
 
 class Progress:
-    """What a run tells: about ten plain lines and one every half a minute, or a bar with the last figures.
+    """The progress of a run: about ten plain lines and at least one per half minute, or a bar with the latest figures.
 
-    Times that are told leave out what was spent on compiling, which happens once.
+    Times per generation and times left do not include compilation, which happens once.
 
     Args:
-        stream: where the lines go; without it nothing is said, which is the default from Python.
-        bar: stands in for the lines.
-        tenths: whether a log gets a line every tenth part of the run, and what comes after.
-        doing: what that line says is going on; left out, the part of the run.
+        stream: where the lines go; None, the default from Python, prints nothing.
+        bar: shown instead of the lines.
+        tenths: whether to print a line after every tenth of the run and for each later stage.
+        doing: says what is going on when there was no line for a while; by default, the part of the run.
     """
 
     def __init__(
@@ -47,10 +47,10 @@ class Progress:
         self._doing = doing or self._part
         self._compiled_before, self._has_compiled = 0.0, False
         self._stage, self._ending = "", contextlib.ExitStack()
-        self._before: int | None = None  # what was done before the start, by a run that is gone on with
+        self._before: int | None = None  # how much a resumed run had done before the start
 
     def start(self, title: str, total: int, unit: str = "generation") -> None:
-        """Begin a training, or a test of so many levels; the title stands before every line, or above the bar."""
+        """Begin a training, or a test, of `total` units; the title is printed before every line, or above the bar."""
         self._title, self._unit, self._total, self._done = title, unit, total, 0
         self._began, self._compiled_before = time.perf_counter(), seconds_compiled()
         self._stage, self._before = "", None
@@ -70,7 +70,7 @@ class Progress:
             self._ending.callback(over.set)
 
     def say(self, text: str) -> None:
-        """Print something that is worth a line."""
+        """Print a line."""
         self._spoke = time.perf_counter()
         if self._bar:
             self._bar.console.print(text, highlight=False)
@@ -78,7 +78,7 @@ class Progress:
             print(f"{self._title}: {text}" if self._title else text, file=self._stream, flush=True)
 
     def stage(self, text: str) -> None:
-        """Tell what happens from now on, which is none of the units that are counted."""
+        """Report what happens from now on if it is not one of the counted units."""
         self._stage = text
         if self._tenths:
             self.say(text)
@@ -90,7 +90,7 @@ class Progress:
         self.advance(int(number), figures)
 
     def advance(self, number: int, figures: str) -> None:
-        """Move the bar; or print every tenth part, the last one, and what ends a silence."""
+        """Move the bar, or print a line after every tenth, at the end, and after a long silence."""
         self._done, self._stage = number, ""
         self._before = number - 1 if self._before is None else self._before
         compiled = seconds_compiled() - self._compiled_before
@@ -104,7 +104,7 @@ class Progress:
             self.say(f"{self._unit} {number}/{self._total}  {figures}  {each:.2f} s each, {left}")
 
     def stop(self) -> None:
-        """End it, whether it went well or not."""
+        """End the report, whether or not all went well."""
         self._ending.close()
 
     def _compiling(self, is_cached: bool) -> None:
@@ -124,7 +124,7 @@ class Progress:
 
 
 def bar_on(console: Console) -> Bar:
-    """A bar that keeps its counter and times on any terminal, and cuts the figures that have no room."""
+    """A bar that shows its counter and times on any terminal, and cuts off figures that do not fit."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
     from rich.table import Column

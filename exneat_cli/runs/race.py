@@ -1,4 +1,4 @@
-"""Who of several teams is the best on validation episodes."""
+"""Which of several teams is the best on validation episodes."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from exneat_cli.rollouts import Outcomes, Runner
 from exneat_cli.seeding import EpisodeSeeds
 
 FIRST_ROUND = 2
-"""Episodes of every team in the first round of a race."""
+"""Episodes per team in the first round of a race."""
 
 
 def race(
     runner: Runner, brains: Sequence[Brains], episodes: Sequence[EpisodeSeeds], first: int = FIRST_ROUND
 ) -> tuple[int, list[Outcomes]]:
-    """Let brains race by successive halving: the better half of a round goes on with twice as many episodes.
+    """Let brains race by successive halving: the better half of a round continues with twice as many episodes.
 
-    Few episodes are enough to drop the worst ones, and the last ones get them all. Source: Karnin, Koren and Somekh,
+    A few episodes are enough to drop the worst brains; only the last ones run all. Source: Karnin, Koren and Somekh,
     "Almost optimal exploration in multi-armed bandits", ICML 2013.
 
     Args:
-        runner: of the episodes.
-        brains: of one team each, at least one.
-        episodes: the same for all of them; who runs in a round runs the next ones in this order.
-        first: episodes of the first round; as many as there are make one round for all.
+        runner: runs the episodes.
+        brains: at least one, each of a single team.
+        episodes: the same for all brains; each round runs the next ones, in this order.
+        first: number of episodes in the first round; with all of them there is only one round.
 
     Returns:
-        The index of the best mean, of equals the first one, and what every brain got until it was dropped.
+        The index of the brain with the best mean (the first of equals), and each brain's outcomes until it was dropped.
     """
     got: list[list[Outcomes]] = [[] for _ in brains]
     running, done, to = list(range(len(brains))), 0, min(first, len(episodes))

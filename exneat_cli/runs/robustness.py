@@ -25,7 +25,7 @@ def load_settings(directory: RunDirectory) -> RunSettings:
     """The settings of a finished run, see `read_settings`.
 
     Raises:
-        ExneatError: it is not finished, or see there.
+        ExneatError: it is not finished, or as for `read_settings`.
     """
     settings = read_settings(directory)
     manifest = directory.read_manifest()
@@ -53,7 +53,7 @@ def read_settings(directory: RunDirectory) -> RunSettings:
     except ConfigError as error:
         raise ExneatError(f"{directory.config}: {error}") from error
     if (manifest.configuration_hash, manifest.generations) != (settings.full_hash, settings.trained_generations):
-        raise ExneatError(f"{directory.config}: does not describe the run beside it: its hash is not the manifest's")
+        raise ExneatError(f"{directory.config}: does not describe this run: its hash differs from the manifest's")
     return settings
 
 
@@ -71,7 +71,7 @@ def missing_levels(directory: RunDirectory, sweep: Sweep, episodes: int) -> tupl
 
 
 def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) -> None:
-    """Refuse what could not be run, before anything is.
+    """Refuse what could not be run before anything is run.
 
     Raises:
         ConfigError: a sweep does not fit the task, a level is out of range, or there are no episodes.
@@ -84,7 +84,7 @@ def check_sweeps(settings: RunSettings, sweeps: Sequence[Sweep], episodes: int) 
             except ConfigError as error:
                 key, expected, came, fix = error.args
                 if key != "sweep":
-                    fix = f"level {level:g} of sweep {sweep.name} sets it; choose others with sweep.levels=[...]"
+                    fix = f"level {level:g} of sweep {sweep.name} sets it; choose other levels with sweep.levels=[...]"
                 raise ConfigError(key, expected, came, fix) from error
 
 
@@ -97,15 +97,15 @@ def run_robustness(
     executor: Executor,
     progress: Progress | None = None,
 ) -> int:
-    """Test a finished run at every level that is not in its robustness.csv yet; returns how many that were.
+    """Test a finished run at every level that is not in its robustness.csv yet; returns how many levels it tested.
 
-    Each level gets that many test `episodes`, the same ones at all levels and for all runs.
+    Each level gets `episodes` test episodes, the same ones at all levels and for all runs.
 
     Raises:
         ExneatError: the run is not usable, is being written by another process, or a level makes no sense.
     """
     executor.check_installed()
-    load_settings(directory)  # before a directory that does not exist is held
+    load_settings(directory)  # before trying to hold a directory that does not exist
     progress, done = progress or Progress(), 0
     with directory.held(), contextlib.ExitStack() as ending:
         settings = load_settings(directory)
@@ -158,5 +158,5 @@ def load_champion(directory: RunDirectory, settings: RunSettings) -> Champion:
         variants = f"expected a champion of {settings.variant}, got {champion.variant}"
         raise ExneatError(f"{directory.champion}: {variants}")
     if champion.plan != settings.plan or champion.feed_forward != settings.evolution.feed_forward:
-        raise ExneatError(f"{directory.champion}: is wired differently from what config.yaml beside it says")
+        raise ExneatError(f"{directory.champion}: its wiring is not the one that config.yaml beside it describes")
     return champion

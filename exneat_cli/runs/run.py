@@ -54,13 +54,13 @@ def train(
     go_on: bool = False,
     tracking: Tracking | None = None,
 ) -> Finished:
-    """Do one run, or find it done; nothing is shown without `progress`, and `command` is for the manifest.
+    """Do one run, or find it done; `progress`, if given, shows how it goes, and `command` is recorded in the manifest.
 
-    An unfinished run is gone on with if `go_on` or `settings.resume`, which alone makes a finished one longer. Whoever
-    gives the settings' trackers as `tracking` may tell them more, and closes them.
+    An unfinished run is continued with `go_on` or `settings.resume`; a finished one is extended with `settings.resume`
+    only. A caller that passes the settings' trackers as `tracking` may tell them more, and must close them.
 
     Raises:
-        ExneatError: the directory is unusable or holds something else, or no team survived.
+        ExneatError: the directory is unusable or holds something else than this run, or every team failed.
     """
     settings.executor.check_installed()
     check_trackers(settings.trackers)
@@ -103,25 +103,25 @@ def _do(settings: RunSettings, directory: RunDirectory, progress: Progress, told
 
 
 def _told_of_backend(settings: RunSettings, result: Result) -> str:
-    """What else to say of a run that was not trained in the precision that it was tested in."""
+    """What to add about a run that was trained in another precision than it was tested in."""
     if settings.executor.name != "warp" or result.training is None:
         return ""
     device, digits = settings.executor.device_name, settings.task.fitness_decimals
-    earned = f"the best team earned {result.training:.{digits}f} in an episode of training"
-    return f" These are figures of the CPU in float64; on {device} in float32 {earned}."
+    earned = f"the best team earned {result.training:.{digits}f} in a training episode"
+    return f" These figures are from the CPU in float64; on {device} in float32, {earned}."
 
 
 def _refuse_changed_files(settings: RunSettings, asked: Mapping[str, Any]) -> None:
-    """Refuse to begin anew what was to be resumed, because a file that the task is made of has changed since."""
+    """Refuse to start a new run in place of one to be resumed because a file of the task has changed."""
     siblings = settings.directory.path.parent.glob(f"{settings.variant}-s{settings.seed}-*")
     for path in sorted(siblings) if settings.task.files() else ():
         if RunDirectory(path).is_alike(asked):
-            fix = f"use the copy in {path / 'model'}, or leave resume=true out for a new run"
-            raise ExneatError(f"{path}: began with other files of the task than there are now\n  {fix}")
+            fix = f"use the copy in {path / 'model'}, or leave out resume=true for a new run"
+            raise ExneatError(f"{path}: the task's files have changed since this run began\n  {fix}")
 
 
 def _save(directory: RunDirectory, training: Training) -> None:
-    """Write down the generation that is done."""
+    """Save the generation that is done."""
     if signal_heard() is not None:  # a library may have swallowed the exception
         raise KeyboardInterrupt
     write_history(directory.history, training.history)
@@ -133,7 +133,7 @@ def _save(directory: RunDirectory, training: Training) -> None:
 def _recorded(
     directory: RunDirectory, settings: RunSettings, progress: Progress, command: Sequence[str]
 ) -> Iterator[None]:
-    """Keep the manifest: how the run began, and how it ended if that is before its result."""
+    """Keep the manifest up to date: how the run began, and how it ended if it has no result."""
     before = directory.read_manifest() if directory.is_there() else None
     manifest = _manifest(settings, command, before)
     if before:
@@ -145,7 +145,7 @@ def _recorded(
         if settings.geometry.name == "auto" and settings.algorithm.modular:
             vector = settings.geometry.subpopulations(settings.task.parts)
             parts = zip(settings.task.parts, vector, strict=True)
-            progress.say(f"geometry=auto shares by likeness: {', '.join(f'{part.name} {n}' for part, n in parts)}")
+            progress.say(f"geometry=auto, genomes by likeness: {', '.join(f'{part.name} {n}' for part, n in parts)}")
         yield
     except (Exception, KeyboardInterrupt) as error:
         _mark_unfinished(directory, error)
@@ -166,11 +166,11 @@ def _tell_other_versions(before: Manifest, progress: Progress) -> None:
     now, then = provenance.versions(), before.versions
     changed = [f"{name} {then.get(name)} then, {now[name]} now" for name in now if then.get(name) != now[name]]
     if changed:
-        progress.say(f"{', '.join(changed)}: results may differ from those of an undisturbed run")
+        progress.say(f"{', '.join(changed)}: results may differ from those of an uninterrupted run")
 
 
 def _manifest(settings: RunSettings, command: Sequence[str], before: Manifest | None) -> Manifest:
-    """That of a run that begins now, or goes on where the one `before` ended."""
+    """The manifest of a run that begins now, or continues where the one `before` ended."""
     return Manifest(
         format=MANIFEST_FORMAT,
         status=RUNNING,

@@ -1,4 +1,4 @@
-"""The end of a run: its champion, chosen on validation episodes and tested beside what is simpler, and its figures."""
+"""The end of a run: the champion is chosen on validation episodes, and tested together with simpler agents."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from exneat_cli.tasks import HasDistance, Task
 
 
 def choose_champion(training: Training, directory: RunDirectory, progress: Progress) -> Result:
-    """Validate the candidates, test the best, write both; returns the figures for the manifest.
+    """Validate the candidates, test the best one, and write both; returns the figures for the manifest.
 
-    Under ``champion=thesis`` all of them have all validation episodes (Zhang, 2025, section 3.3), else they race.
+    Under ``champion=thesis`` all candidates run all validation episodes (Zhang, 2025, section 3.3); else they race.
 
     Raises:
         ExneatError: there is no candidate.
@@ -130,7 +130,7 @@ def score_all(outcomes: Outcomes) -> list[Score]:
 
 
 def unseen_episodes(settings: RunSettings, episodes: int) -> list[EpisodeSeeds]:
-    """The test episodes, equal for all runs and variants; random actions are drawn from the run's own stream."""
+    """The test episodes, the same for all runs and variants; random actions are drawn from the run's own stream."""
     tests = shared_episodes("test", episodes)
     if settings.algorithm.rule != "random":
         return tests
@@ -144,10 +144,10 @@ def robustness_row(settings: RunSettings, parameter: str, level: float, score: S
 
 
 def summary_sentence(task: Task, result: Result) -> str:
-    """What a run learned, in one sentence, from the `result` entry of its manifest; another tells of plain Python.
+    """What a run learned, in one sentence, from the `result` of its manifest; another sentence if it is plain Python.
 
-    It says "Learned" only if the champion beats both baselines clearly, and where a task is about moving forward, does
-    so in most episodes. Clearly: on the same test episodes, the mean difference exceeds twice its standard error.
+    It says "Learned" only if the champion clearly beats both baselines and, where a task is about moving forward, moves
+    forward in most episodes. Clearly: in the same test episodes, the mean difference exceeds twice its standard error.
     """
     champion, standing = result.champion, result.standing_still
     digits = task.fitness_decimals
@@ -156,7 +156,7 @@ def summary_sentence(task: Task, result: Result) -> str:
     earned = (
         f"earned a {task.fitness_name} of {champion.fitness_mean:.{digits}f} on average "
         f"(sd {champion.fitness_std:.{digits}f}{failures}), "
-        f"beside {standing.fitness_mean:.{digits}f} for standing still"
+        f"compared with {standing.fitness_mean:.{digits}f} for standing still"
     )
     first, way = result.first_generation, _way(task, champion)
     speed = "" if is_compiled(task) else f" task={task.name} runs in plain Python, which is slower than compiled tasks."
@@ -165,13 +165,13 @@ def summary_sentence(task: Task, result: Result) -> str:
     forward = not isinstance(task, HasDistance) or _moving_forward(champion) > champion.episodes / 2
     learned = forward and _clearly_better(champion, standing) and _clearly_better(champion, first)
     return (
-        f"{'Learned' if learned else 'Nothing learned for sure'}: {episodes} the champion {way}{earned} "
+        f"{'Learned' if learned else 'Nothing clearly learned'}: {episodes} the champion {way}{earned} "
         f"and {first.fitness_mean:.{digits}f} for the best team of the random first generation.{speed}"
     )
 
 
 def _way(task: Task, score: Score) -> str:
-    """How far it went, where the task tells, e.g. ``walks 31 m in 50 s (0.62 m/s), forward in 20 of 20, and ``."""
+    """How far it went, where the task tells, e.g. ``went 31.0 m in 50 s (0.62 m/s), forward in 20 of 20, and ``."""
     period = task.step_seconds
     if not isinstance(task, HasDistance) or score.steps_mean is None or period is None:
         return ""

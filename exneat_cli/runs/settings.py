@@ -1,4 +1,4 @@
-"""Everything that defines one run, as one frozen object that can be written down and read back."""
+"""Everything that defines one run, as one frozen object that can be written to a file and read back."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from exneat_cli.wiring import CENTRAL, Geometry, Plan, Wiring
 
 _Part = TypeVar("_Part")
 _NO_POSE = 0.1
-"""The `noise.reset_scale` of tasks that have no initial pose: it disturbs nothing, and is part of hashes."""
+"""The `noise.reset_scale` of tasks without an initial pose: it has no effect, but is part of hashes."""
 _CAME_LATER = (
     ("", "judging", "last"),
     ("", "champion", "thesis"),
@@ -45,8 +45,8 @@ _CAME_LATER = (
     ("evolution", "crossover_prob", 1.0),
     ("evolution", "parent_selection", "uniform"),
 )
-"""Settings by section and name that came later, with the value that gives what was before: runs with that value keep
-their hashes."""
+"""Settings that were added later, by section and name, with the value that means the earlier behaviour: runs with that
+value keep their hashes."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -59,24 +59,24 @@ class RunSettings:
         algorithm: settings of the algorithm, or its name in `ALGORITHMS` for its defaults.
         geometry, linkage, wiring: how modules are wired.
         noise: what disturbs the agent, in training, validation and test alike.
-        evolution: how genomes change and compete; left out, what suits the task's kind of network.
-        executor: where episodes run; without effect on results, but for ``warp`` and its device.
-        seed: root of all random streams but those of validation and test.
+        evolution: how genomes change and compete; by default, settings that suit the task's kind of network.
+        executor: where episodes run; without effect on results, except for ``warp`` and its device.
+        seed: root of all random streams except those of validation and test.
         generations, population: of each subpopulation.
         episodes: training episodes per team and generation.
         pairing: ``rank``, ``parents`` or ``index``.
         judging: ``last`` or ``mean``: a team that survives competes by its mean over the episodes of one generation, or
-            over all that it ever had; then the best get a second look, at the expense of new teams.
-        champion: ``race`` or ``thesis``, how the champion is chosen.
+            over all that it ever had; under ``mean`` the best are evaluated again, at the expense of new teams.
+        champion: how the champion is chosen, ``race`` or ``thesis``.
         validation_episodes: per team of the hall of fame; in a race, of the last teams in it.
-        test_episodes: per brain that is tested.
+        test_episodes: per tested brain.
         name: directory below `output`; None takes the task's name.
         output: root of all run directories; a leading ``~`` is the home directory.
-        resume: go on with an unfinished run, or make a finished one longer.
-        checkpoint_every: generations from one checkpoint to the next.
-        tracker: of `TRACKERS`, one or several, that are told of the run; without effect on results.
-        task_kind: ``package.module:Class`` of the task if that is how its user names it, else None; plain data has it
-            as ``task.kind``.
+        resume: continue an unfinished run, or extend a finished one.
+        checkpoint_every: generations between checkpoints.
+        tracker: one or several of `TRACKERS`, which are told of the run; without effect on results.
+        task_kind: ``package.module:Class`` of the task if the user named it that way, else None; ``task.kind`` in plain
+            data.
 
     Raises:
         ConfigError: a value is out of range, or the combination makes no sense.
@@ -133,11 +133,11 @@ class RunSettings:
             raise ConfigError("name", "one folder name of letters, digits, '.', '_' and '-'", self.name, fix)
         self._settle()
         if self.executor.name == "warp" and not isinstance(self.task, HasBatch):
-            raise ConfigError("executor", f"another one with task={self.task.name}", "warp", "only robots run there")
+            raise ConfigError("executor", f"another executor with task={self.task.name}", "warp", "it runs robots only")
         self.algorithm.check(self.problem)
 
     def _settle(self) -> None:
-        """Put numbers and words in place of what is left to the task and to how its parts share genomes."""
+        """Fill in what is left to the task, and to how its parts share genomes."""
         own = self.task.usual_reset_scale() if isinstance(self.task, HasInitialPose) else None
         if own is None and self.noise.reset_scale not in (None, _NO_POSE):
             fix = f"task={self.task.name} has no initial pose that noise could disturb"
@@ -169,7 +169,7 @@ class RunSettings:
 
     @property
     def variant(self) -> str:
-        """What is compared, in one word, e.g. ``exneat-all-none`` or ``neat``."""
+        """The variant in one word, e.g. ``exneat-all-none`` or ``neat``."""
         if not self.algorithm.modular:
             return self.algorithm.name
         vector = self.geometry.subpopulations(self.task.parts) if self.geometry.vector else ()
@@ -183,7 +183,7 @@ class RunSettings:
 
     @property
     def wants_moments(self) -> bool:
-        """Whether the algorithm is told the statistics of what networks sense."""
+        """Whether the algorithm wants statistics of what the networks sense."""
         return self.algorithm.wants_moments(self.evolution)
 
     @property
@@ -194,7 +194,7 @@ class RunSettings:
 
     @property
     def trained_generations(self) -> int:
-        """Generations of training; 0 for a baseline, which nothing trains."""
+        """Generations of training; 0 for a baseline, which is not trained."""
         return 0 if self.algorithm.rule else self.generations
 
     @cached_property
@@ -205,7 +205,7 @@ class RunSettings:
 
     @cached_property
     def full_hash(self) -> str:
-        """Hash of everything that results depend on, but for the number of generations."""
+        """Hash of everything on which results depend, except the number of generations."""
         return configuration_hash(self._identity())
 
     def _identity(self) -> dict[str, Any]:
@@ -236,8 +236,8 @@ class RunSettings:
         """Settings from plain data, such as a composed configuration or a run's config.yaml.
 
         Raises:
-            ConfigError: a key is unknown, a value has the wrong type or range, or a user's code would have to be
-                imported that this user neither registered nor named, see `exneat_cli.tasks.user_code`.
+            ConfigError: a key is unknown, a value has the wrong type or range, or it would need code that
+                the user neither registered nor named, see `exneat_cli.tasks.user_code`.
         """
         kind, task = _task(plain.get("task"))
         algorithm = _chosen(ALGORITHMS, "algorithm", plain.get("algorithm", {"name": "exneat"}))
@@ -253,15 +253,15 @@ def _suiting(task: Task) -> EvolutionSettings:
 
 
 def _task(values: object) -> tuple[str | None, Task]:
-    """How the user names the task's class, if not by the task's name, and the task."""
+    """The name of the task's class, if the user chose the task by that, and the task."""
     section = {key: value for key, value in check_section("task", values).items() if (key, value) != ("name", None)}
     found, kind = find_task(section, TASKS), section.pop("kind", None)
     try:
         return kind, build(found, section, "task.")
     except ExneatError:
         raise
-    except Exception as error:  # what a user's class does with values that it does not expect
-        raise ConfigError("task", f"parameters that {found.__name__} can take", section, repr(error)[:300]) from error
+    except Exception as error:  # whatever a user's class raises on values that it does not expect
+        raise ConfigError("task", f"parameters that {found.__name__} accepts", section, repr(error)[:300]) from error
 
 
 def read_task(section: object) -> Task:

@@ -24,11 +24,11 @@ _FIRST = "first_generation"
 
 @dataclass
 class Training:
-    """A training between two generations, with a row of history for each that is done; `advance` does the next one.
+    """A training between two generations, with a row of history for each finished one; `advance` does the next.
 
     Attributes:
         first_generation: the best team of the first generation, which is random; None before it.
-        began: clock time (s) at which an undisturbed training would have begun.
+        began: clock time (s) at which an uninterrupted training would have begun.
     """
 
     settings: RunSettings
@@ -44,9 +44,9 @@ class Training:
 
     @classmethod
     def resumed(cls, settings: RunSettings, checkpoints: Iterable[State | str], say: Callable[[str], None]) -> Training:
-        """Go on from the first checkpoint that is sound, else begin; the results are the same.
+        """Continue from the first sound checkpoint, or else begin anew; the results are the same.
 
-        The newest checkpoint comes first; a line, which is said, stands in place of each that cannot be read.
+        The newest checkpoint comes first; in place of one that cannot be read comes a line, which is passed to `say`.
         """
         for checkpoint in checkpoints:
             if isinstance(checkpoint, str):
@@ -58,13 +58,13 @@ class Training:
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                 say(f"checkpoint of generation {generation}: damaged: {error!r}")
             else:
-                say(f"going on after generation {generation}")
+                say(f"continuing after generation {generation}")
                 return training
         return cls.start(settings)
 
     @classmethod
     def _restored(cls, settings: RunSettings, checkpoint: State) -> Training:
-        """The training that `checkpoint` was taken of, unless it is damaged or of other settings."""
+        """The training from which `checkpoint` was taken; an error if that is damaged or of other settings."""
         problem, (plain, arrays) = settings.problem, checkpoint
         history = [_sound(number, row) for number, row in enumerate(plain["history"], start=1)]
         if not 1 <= len(history) == plain["generation"] <= settings.generations:
@@ -79,7 +79,7 @@ class Training:
         return len(self.history) >= self.settings.generations
 
     def advance(self, runner: Runner) -> None:
-        """Evaluate one generation, in as many turns as the algorithm wants, and record it."""
+        """Evaluate one generation, in as many turns as the algorithm requests, and record it."""
         settings, over = self.settings, False
         teams: list[Team] = []
         outcomes: list[Outcomes] = []
@@ -121,7 +121,7 @@ class Training:
         )
 
     def checkpoint(self) -> State:
-        """All that the rest of the training depends on; taking it changes nothing."""
+        """Everything on which the rest of the training depends; taking it changes nothing."""
         assert self.first_generation is not None
         search, arrays = self.search.state()
         plain = {"generation": len(self.history), "search": search, "history": self.history}
@@ -129,7 +129,7 @@ class Training:
 
 
 def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
-    """A row of a checkpoint, which must be that of generation `number`."""
+    """A row of a checkpoint, checked to be that of generation `number`."""
     finite = all(isinstance(value, int | float) and math.isfinite(value) for value in row.values())
     if not finite or row["generation"] != number or not row.keys() >= set(HISTORY_COLUMNS):
         raise ValueError(f"expected the figures of generation {number}, got {row}")
@@ -137,7 +137,7 @@ def _sound(number: int, row: Mapping[str, Any]) -> HistoryRow:
 
 
 def _results(settings: RunSettings, outcomes: Outcomes) -> Results:
-    """What the algorithm is told; a team that failed once has the failure floor in all of its episodes."""
+    """What the algorithm is told; a team that failed once gets the failure floor in all of its episodes."""
     failed: NDArray[np.bool_] = np.any(outcomes.failed, axis=1)
     outcomes.fitness[failed] = settings.task.failure_floor
     sensed = () if outcomes.moments is None else pooled_by_pin(settings.plan, outcomes.moments)

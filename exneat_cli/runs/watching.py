@@ -1,4 +1,4 @@
-"""One recorded episode of a champion: what its world was, what its networks held, and how far it got."""
+"""One recorded episode of a champion: the states of its world, the values in its networks, and how far it got."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from exneat_cli.seeding import EpisodeSeeds, shared_episodes, stream
 from exneat_cli.tasks import HasDistance, HasPicture, HasTiles, Task
 
 SMOOTHED = 1.0
-"""Seconds over which a speed is taken."""
+"""Seconds over which a speed is averaged."""
 BODY_FPS, STEP_FPS = 10.0, 4.0
-"""Frames a second unless told otherwise: of a body's own time, at most one a control step; where steps have no
-duration, one each."""
+"""Default frames per second: for bodies, of simulated time, with at most one frame per control step; where steps have
+no duration, with one frame per step."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Scene:
     Attributes:
         task: whose cameras draw it.
         champion: who acted.
-        title: the run in a word.
+        title: the run's name, and the sweep with its level, if any.
         nodes: inputs and nodes of modules, see `exneat_cli.brains.places_in_memory`.
-        snapshots: F of the world.
-        shares: (F, nodes) their values over the largest magnitude so far.
-        captions: F of them.
-        fps: frames a second, in real time where steps have a duration.
+        snapshots: F states of the world.
+        shares: (F, nodes), the nodes' values divided by their largest magnitude so far.
+        captions: F texts.
+        fps: frames per second, in real time where steps have a duration.
     """
 
     task: Task
@@ -52,15 +52,15 @@ class Scene:
 def record_champion(
     directory: RunDirectory, *, episode: int, seed: int | None, sweep: Sweep | None, steps: int, fps: float | None
 ) -> Scene:
-    """Let a run's champion go through a test episode, of at most so many steps.
+    """Run a run's champion in a test episode of at most `steps` steps.
 
     Args:
         directory: of a finished run.
         episode: which of the test episodes, from 0; the first is that of trace.csv.
         seed: root of other episodes instead; None for the test episodes.
-        sweep: with one level, at which it is watched.
-        steps: at most.
-        fps: frames a second; None for `BODY_FPS` or `STEP_FPS`.
+        sweep: with one level, at which to watch it; None for no perturbation.
+        steps: the largest number of control steps.
+        fps: frames per second; None for `BODY_FPS` or `STEP_FPS`.
 
     Raises:
         ExneatError: the run has no champion, its task cannot be drawn, or the sweep does not fit it.
@@ -71,14 +71,14 @@ def record_champion(
         task, noise = perturbed(task, noise, sweep, sweep.levels[0])
     task, period = task.drawable(), task.step_seconds
     if not isinstance(task, HasPicture):
-        fix = "a class of yours is watched once it has the methods snapshot() and camera(), see HasPicture"
+        fix = "a class of your own needs the methods snapshot() and camera() for that, see HasPicture"
         raise ExneatError(f"task={task.name}: expected a task whose worlds can be drawn\n  {fix}")
     every = 1 if period is None else max(1, round(1.0 / ((fps or BODY_FPS) * period)))
     recording = record(task, noise, champion.brain(), _seeds(episode, seed), steps, every)
     nodes, values = _values(champion, recording, every)
     captions = _captions(task, recording.trace, range(0, len(values), every))
     level = "" if sweep is None else f", {sweep.name} {sweep.levels[0]:g}"
-    # So far: nodes of relu that feed themselves may grow without bounds, and would seem to begin with nothing.
+    # Only so far: relu nodes that feed themselves may grow without bounds, and would seem to be 0 at first.
     largest = np.maximum.accumulate(np.abs(values), axis=0)
     shares = (values / np.where(largest > 0.0, largest, 1.0))[::every]
     pace = (fps or STEP_FPS) if period is None else 1.0 / (every * period)
@@ -86,18 +86,18 @@ def record_champion(
 
 
 def _values(champion: Champion, recording: Recording, every: int) -> tuple[list[tuple[int, int]], NDArray[np.float64]]:
-    """Inputs and nodes that are ever evaluated, and (steps, nodes) their values when the world was as at that step."""
+    """Inputs and nodes that are ever evaluated, and their values (steps, nodes) in the world of each step."""
     genomes = [genome.in_arrays() for genome in champion.genomes]
     places = places_in_memory(champion.plan, genomes, feed_forward=champion.feed_forward)
     nodes = list(places)
     values = recording.values[:, list(places.values())]
     if not champion.feed_forward:
-        # What a module read of another one is what that one held at the step before.
+        # A module reads the values that another one had at the step before.
         modules = champion.plan.modules
         linked = [k for k, (m, key) in enumerate(nodes) if key < 0 and not modules[m].pins[-1 - key].is_sensor]
         values[1:, linked] = values[:-1, linked].copy()
         values[0, linked] = 0.0
-    if len(recording.snapshots) > len(values[::every]):  # what the last step led to, at which no network looks
+    if len(recording.snapshots) > len(values[::every]):  # the world after the last step, which no network senses
         values = np.concatenate([values, values[-1:]])
     return nodes, values
 
@@ -109,7 +109,7 @@ def _seeds(episode: int, seed: int | None) -> EpisodeSeeds:
 
 
 def _captions(task: Task, trace: NDArray[np.float64], shown: range) -> list[str]:
-    """Of the world as it is before each of these steps."""
+    """Captions for the world before each of these steps."""
     columns, period = list(task.trace_columns), task.step_seconds
     times = [f"step {t}" if period is None else f"time {t * period:5.1f} s" for t in shown]
     if isinstance(task, HasTiles):
@@ -122,7 +122,7 @@ def _captions(task: Task, trace: NDArray[np.float64], shown: range) -> list[str]
         for t in shown:
             first = max(0, t - max(1, round(SMOOTHED / period)))
             speed = (x[t] - x[first]) / (max(1, t - first) * period)
-            # Adding 0 takes the sign of what rounds to 0.
+            # Adding 0 turns a rounded -0.0 into 0.0.
             said.append(f"    speed {round(speed, 2) + 0.0:5.2f} m/s    distance {round(x[t] - x[0], 2) + 0.0:6.2f} m")
     else:
         fitness = task.fitness_of(np.cumsum(trace[:, len(columns) :], axis=0))

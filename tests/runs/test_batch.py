@@ -111,7 +111,7 @@ def test_the_backend_is_part_of_the_hash_but_the_number_of_worlds_is_not(tmp_pat
 
 
 def test_what_cannot_run_in_batches_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ConfigError, match=re.escape("executor: expected another one with task=track_maze")):
+    with pytest.raises(ConfigError, match=re.escape("executor: expected another executor with task=track_maze")):
         small(tmp_path, executor=on_warp(3))
     if not wp.is_cuda_available():
         with pytest.raises(ExneatError, match=r"executor\.device: expected one of cpu, got cuda\n"):

@@ -36,11 +36,11 @@ def test_a_log_gets_a_line_where_nothing_ends_for_long(monkeypatch: pytest.Monke
     stream = io.StringIO()
     lines = Progress(stream)
     lines.start("neat-s0", 95)
-    while "generation 1/95 goes on" not in stream.getvalue():
+    while "generation 1/95, still running" not in stream.getvalue():
         time.sleep(0.01)
     lines.generation(row(1))
     lines.stage("validating 7 teams")
-    while "validating 7 teams goes on" not in stream.getvalue():
+    while "validating 7 teams, still running" not in stream.getvalue():
         time.sleep(0.01)
     lines.stop()
 

@@ -125,7 +125,7 @@ def test_linked_modules_on_ant_go_on_to_the_same_bytes(tmp_path: Path) -> None:
     train_stopping(dataclasses.replace(settings, resume=True), "write_history", 2)
     found, said = resumed(settings)
     assert found == undisturbed
-    assert any(text.startswith("going on after generation 2") for text in said)
+    assert any(text.startswith("continuing after generation 2") for text in said)
 
 
 def test_a_run_that_judges_by_all_episodes_and_adapts_its_mutations_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_a_run_that_stops_after_training_trains_no_more(tmp_path: Path, name: st
     train_stopping(settings, name, 1)
     found, said = resumed(settings)
     assert found == undisturbed
-    assert f"going on after generation {GENERATIONS}" in said
+    assert f"continuing after generation {GENERATIONS}" in said
 
 
 @pytest.mark.parametrize("every", [2, 3, 100])
@@ -158,7 +158,7 @@ def test_how_often_a_checkpoint_is_written_changes_nothing(tmp_path: Path, every
     found, said = resumed(settings)
     assert found == undisturbed
     assert [text for text in said if text.startswith("going on")] == (
-        [] if every == 100 else [f"going on after generation {3 // every * every}"]
+        [] if every == 100 else [f"continuing after generation {3 // every * every}"]
     )
 
 
@@ -184,7 +184,7 @@ def test_a_damaged_checkpoint_is_passed_over_for_the_one_before_it_or_the_beginn
     found, said = resumed(settings)
     assert found == undisturbed
     assert len([text for text in said if "damaged" in text]) == damaged
-    assert ("going on after generation 3" in said) == (damaged == 1)
+    assert ("continuing after generation 3" in said) == (damaged == 1)
 
 
 @pytest.mark.parametrize("genome", ["array", "stock"])
@@ -198,7 +198,7 @@ def test_a_finished_run_that_is_made_longer_ends_as_one_that_was_longer_from_the
     run_robustness(train(settings).directory, [SWEEP], episodes=3, executor=Executor("serial"))
     assert settings.directory.robustness.exists()
     _, said = resumed(settings, generations=GENERATIONS)
-    assert "going on after generation 2" in said
+    assert "continuing after generation 2" in said
     assert not settings.directory.robustness.exists()
     run_robustness(settings.directory, [SWEEP], episodes=3, executor=Executor("serial"))
     assert content(settings.directory) == content(longer.directory)

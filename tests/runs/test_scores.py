@@ -54,11 +54,11 @@ def figures(*fitness: float, failed: int = 0) -> Score:
     ("champion", "standing", "first", "verdict"),
     [
         ((100.0, 110.0, 95.0), (0.0, 1.0, -1.0), (5.0, 6.0, 7.0), "Learned:"),
-        ((4.0, 5.0, 6.0), (0.0, 0.0, 0.0), (5.0, 5.0, 5.0), "Nothing learned for sure:"),
-        ((4.0, 5.0, 6.0), (6.0, 7.0, 8.0), (1.0, 1.0, 1.0), "Nothing learned for sure:"),
+        ((4.0, 5.0, 6.0), (0.0, 0.0, 0.0), (5.0, 5.0, 5.0), "Nothing clearly learned:"),
+        ((4.0, 5.0, 6.0), (6.0, 7.0, 8.0), (1.0, 1.0, 1.0), "Nothing clearly learned:"),
         # Better on average by a hair, worse on one of the shared episodes by a lot.
-        ((300.0, -270.0, 0.3), (0.0, 0.0, 0.0), (10.0, 10.0, 10.0), "Nothing learned for sure:"),
-        ((100.0,), (0.0,), (5.0,), "Nothing learned for sure:"),
+        ((300.0, -270.0, 0.3), (0.0, 0.0, 0.0), (10.0, 10.0, 10.0), "Nothing clearly learned:"),
+        ((100.0,), (0.0,), (5.0,), "Nothing clearly learned:"),
     ],
 )
 def test_the_verdict_needs_a_clear_difference_to_both_baselines(

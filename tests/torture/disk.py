@@ -82,7 +82,7 @@ def _try(fault: Fault, folder: Path, expected: dict[str, bytes], mistakes: Mista
     if complaint := _complaint(ended, output):
         mistakes.add(f"{fault}: {complaint}")
     again = run_exneat([*_RUN, f"output={output}", "resume=true"], Fault(), folder / "temporary")
-    went_on = re.search(r"going on after generation (\d+)", again.said)
+    went_on = re.search(r"continuing after generation (\d+)", again.said)
     if not was_done and rows > 1 + (int(went_on[1]) if went_on else 0):
         mistakes.add(f"{fault}: went on after generation {went_on[1] if went_on else 0} of {rows}")
     differing = difference(results(output), expected)

@@ -162,7 +162,7 @@ def _is_begun(program: Program) -> bool:
 
 def _measure_repetition(errors: str, rows: int, every: int, tally: _Tally) -> None:
     """Compare the generations that were recorded at a kill with the one that the next start went on from."""
-    said = re.search(r"going on after generation (\d+)", errors)
+    said = re.search(r"continuing after generation (\d+)", errors)
     # Every generation of these short runs has a line of its own, so one without the other began from nothing.
     if said is None and ": generation" not in errors:
         return

@@ -1,6 +1,6 @@
 """MLflow: on the server of MLFLOW_TRACKING_URI, else in ``<output>/mlruns``, which ``mlflow ui`` shows.
 
-When a run is gone on with, MLflow is asked which steps of each column it has, and told the others.
+When a run is resumed, MLflow is asked which steps of each column it has, and gets the others.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from mlflow.tracking import MlflowClient
 from exneat_cli.records import HistoryRow, RunDirectory, configuration_hash, dotted
 
 _TAG = "exneat.run"
-_MOST_PARAMS, _LONGEST_PARAM = 100, 500  # in one request, which MLflow sets
+_MOST_PARAMS, _LONGEST_PARAM = 100, 500  # MLflow's limits: per request, and characters
 _DEFAULTS = {
     "MLFLOW_ALLOW_FILE_STORE": "true",  # newer versions of MLflow want to be told that files suffice without a server
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "3",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
 }
-"""Unless the user has set them. MLflow itself would hold up a run for four minutes over a server that is gone, and for
-a quarter of an hour over one that does not answer; this is 12 s and a minute and a half."""
+"""Set unless the user has set them. By itself, MLflow would hold up a run for four minutes if a server is gone, and for
+a quarter of an hour if it does not answer; with these settings it takes 12 s and a minute and a half."""
 
 
 class OneRun:
-    """A run of the experiment that is named after the run's folder, found again by a tag."""
+    """A run in the experiment named after the run's folder, found again by a tag."""
 
     def __init__(self, run: RunDirectory, settings: Mapping[str, Any], history: Sequence[HistoryRow]) -> None:
         local = (run.path.parent.parent / "mlruns").absolute().as_uri()

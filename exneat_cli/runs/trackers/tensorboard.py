@@ -1,7 +1,7 @@
 """TensorBoard: ``tensorboard --logdir outputs`` shows runs that have ``tracker=tensorboard``.
 
-Its numbers are of 32 bits. Files are written anew from history.csv when a run is gone on with, so that no step is there
-twice, nor half of one that a killed process left.
+Its numbers have 32 bits. When a run is resumed, its files are written anew from history.csv, so that no step is there
+twice, or half, left by a killed process.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tensorboard.summary.writer.event_file_writer import EventFileWriter
 
 from exneat_cli.records import HistoryRow, RunDirectory, as_yaml
 
-_SECONDS = 5  # from one time that rows are handed to the disk to the next
+_SECONDS = 5  # between writes of rows to the disk
 _WIDTH_AND_HEIGHT = slice(16, 24)  # of a PNG: https://www.w3.org/TR/png-3/#11IHDR
 
 

@@ -1,6 +1,6 @@
 """Weights & Biases: offline unless WANDB_MODE=online is set; ``wandb sync <run>/wandb/offline-*`` sends a run later.
 
-An offline run is written anew from history.csv when it is gone on with; a server is told the steps that it lacks.
+A resumed run is written anew from history.csv when offline; a server gets the steps that it lacks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from exneat_cli.records import HistoryRow, RunDirectory, configuration_hash
 
 
 class OneRun:
-    """A run of the project ``exneat`` (or WANDB_PROJECT), in ``<run>/wandb``; its id is made of its settings."""
+    """A run of the project ``exneat`` (or WANDB_PROJECT), in ``<run>/wandb``; its id is made from its settings."""
 
     def __init__(self, run: RunDirectory, settings: Mapping[str, Any], history: Sequence[HistoryRow]) -> None:
         mode = os.environ.get("WANDB_MODE", "offline")
