@@ -28,7 +28,7 @@ CHAMPION_FORMAT = 3
 _LARGEST, _MOST_MODULES = 1_000_000, 1000
 _UNSHOWN = r"\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f\ud800-\udfff"
 _Name = Annotated[str, Meta(pattern=rf"^[^{_UNSHOWN}]{{1,200}}\Z")]
-"""What a task calls a part, a sensor or an actuator: nothing that a terminal would obey."""
+"""The name of a part, a sensor or an actuator, without characters that control a terminal."""
 _Id = Annotated[int, Meta(ge=0, le=2**62)]
 
 
@@ -60,7 +60,7 @@ class Genome(Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def of(cls, genome: ArrayGenome) -> Genome:
-        """What `in_arrays` gives back."""
+        """The genome as data; `in_arrays` converts it back."""
         nodes = [Node(key, bias, response, ACTIVATIONS[a]) for key, bias, response, a in genome.nodes.tolist()]
         connections = [
             Connection(source, target, weight, bool(enabled), innovation)
@@ -82,7 +82,7 @@ class Genome(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Scores(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """How a champion did; one that is put together by hand may do without the first two."""
+    """The scores of a champion; one that was put together by hand may lack the first two."""
 
     training: dict[Word, Real] | None = None
     validation: Score | None = None
@@ -90,7 +90,7 @@ class Scores(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 
 
 class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The team that a run hands over: all that is needed to run it, one genome per subpopulation."""
+    """The team that a run produces: all that is needed to run it, one genome per subpopulation."""
 
     format: int = CHAMPION_FORMAT
     variant: Word
@@ -121,7 +121,7 @@ class Champion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 def read_champion(path: Path) -> Champion:
-    """Read a champion, whose parts fit together.
+    """Read a champion, and check that its parts fit together.
 
     Raises:
         ExneatError: the file is missing or damaged, of another format, or a field is missing, unknown or unusable.
@@ -136,7 +136,7 @@ def read_champion(path: Path) -> Champion:
 
 
 def _check(champion: Champion) -> None:
-    """Refuse what types cannot: sizes out of bounds, and parts that do not fit together."""
+    """Refuse what types cannot express: sizes out of bounds, and parts that do not fit together."""
     plan, genomes = champion.plan, champion.genomes
     check_whole("plan.observation_size", plan.observation_size, 1, _LARGEST)
     check_whole("plan.observation_size", plan.observation_size, len(champion.sensors), len(champion.sensors))
@@ -160,7 +160,7 @@ def _check(champion: Champion) -> None:
 
 
 def write_hall_of_fame(path: Path, entries: Sequence[Candidate], validation: Sequence[Score]) -> None:
-    """Write one line per team: first who had the most validation episodes, and of these the one with the best mean.
+    """Write one line per team, sorted by the number of validation episodes, then by mean fitness, largest first.
 
     Raises:
         ExneatError: the file cannot be written.

@@ -1,7 +1,7 @@
 """Checkpoints: the state of an unfinished run, as data.
 
-One NPZ file per checkpoint, without pickles: columns of numbers and one member of JSON, and behind the archive its
-SHA-256 digest. A file that is damaged in any way is passed over for the one before it.
+One NPZ file per checkpoint, without pickles: columns of numbers and one member of JSON, followed by the SHA-256
+digest of the archive. A damaged file is skipped, and the one before it is used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str
     The plain part says under ``generation`` how many generations are done.
 
     Raises:
-        ExneatError: the file cannot be written; the older ones are still there then.
+        ExneatError: the file cannot be written; the older ones are kept then.
         ValueError: a number is not finite.
     """
     plain, arrays = checkpoint
@@ -46,7 +46,7 @@ def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str
     buffer = io.BytesIO()
     np.savez(buffer, **arrays, **{_STATE: text})  # type: ignore[arg-type]
     write_whole(directory / f"checkpoint-{newest:06d}.npz", with_digest(buffer.getvalue()))
-    # One of a later generation was passed over as damaged: it must not crowd out the sound ones.
+    # A checkpoint of a later generation was skipped as damaged: it must not displace sound ones.
     kept = [path for path, generation in _found(directory) if generation <= newest][:KEPT]
     for path, _ in _found(directory):
         if path not in kept:
@@ -54,7 +54,7 @@ def write_checkpoint(directory: Path, checkpoint: State, configuration_hash: str
 
 
 def with_digest(archive: bytes) -> bytes:
-    """The bytes with their digest behind them; readers of ZIP files pass over what follows the archive."""
+    """The bytes followed by their digest; readers of ZIP files ignore what follows the archive."""
     return archive + hashlib.sha256(archive).digest()
 
 
@@ -79,7 +79,7 @@ def _read(path: Path, head: dict[str, Any]) -> State:
     try:
         arrays = _arrays(data)
         plain = dict(json.loads(arrays.pop(_STATE).tobytes()))
-    except Exception as error:  # NumPy's and the ZIP reader's errors on bytes of any kind are of every class
+    except Exception as error:  # NumPy and the ZIP reader raise errors of many classes on arbitrary bytes
         raise ExneatError(f"{path}: damaged: {error or type(error).__name__}") from error
     for key, expected in head.items():
         if plain.pop(key, None) != expected:

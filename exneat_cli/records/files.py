@@ -26,7 +26,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file that takes the place of `path` in the end, so that a reader or a crash never meets half of it.
+    """Yield a temporary file that replaces `path` at the end, so that neither a reader nor a crash leaves half a file.
 
     Raises:
         ExneatError: the disk is full, the directory is gone or not writable.
@@ -42,13 +42,13 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def delete(path: Path) -> None:
-    """Delete a file that may be there; one that cannot be deleted stays."""
+    """Delete a file if it exists; one that cannot be deleted stays."""
     with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory and those above it, unless they are there.
+    """Make a directory and those above it, unless they exist.
 
     Raises:
         ExneatError: something is in the way, or it cannot be made.
@@ -72,7 +72,7 @@ def write_json(path: Path, content: object) -> None:
         ValueError: a number is not finite.
     """
     text = json.dumps(msgspec.to_builtins(content), indent=2, allow_nan=False, ensure_ascii=False)
-    write_whole(path, f"{text}\n".encode(errors="replace"))  # an argument of the command line may be no UTF-8
+    write_whole(path, f"{text}\n".encode(errors="replace"))  # an argument of the command line may not be UTF-8
 
 
 def read_text(path: Path) -> str:
@@ -93,7 +93,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
     """The content of a file.
 
     Raises:
-        ExneatError: it is missing, unreadable, no file (a directory, or a pipe that would never end), or larger than
+        ExneatError: it is missing, unreadable, not a file (a directory, or a pipe that would never end), or larger than
             `largest` bytes.
     """
     try:

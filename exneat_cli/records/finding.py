@@ -1,4 +1,4 @@
-"""Which run directories there are."""
+"""Finding run directories."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from exneat_cli.records.run_directory import ABSENT, RunDirectory
 
 
 def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None) -> list[RunDirectory]:
-    """Every run below an output root, or in one of its folders, or the run that it is; in alphabetical order.
+    """Every run in an output root or one of its folders, or the run that it is itself; in alphabetical order.
 
-    `unreadable` is told of each folder that cannot be read; what is not there has no runs.
+    `unreadable` is called for each folder that cannot be read; a root that does not exist has no runs.
     """
 
     def tell(error: OSError) -> None:
@@ -32,7 +32,7 @@ def find_runs(output: Path, unreadable: Callable[[OSError], None] | None = None)
 
 
 def runs_at(pattern: Path) -> list[RunDirectory]:
-    """The runs whose directories fit a pattern, in alphabetical order; what is there literally counts before it.
+    """The runs whose directories match a pattern, in alphabetical order; a literal match takes precedence.
 
     Raises:
         ExneatError: a folder where runs may be cannot be read.
@@ -46,7 +46,7 @@ def runs_at(pattern: Path) -> list[RunDirectory]:
 
 def _fitting(folder: Path, part: str) -> list[str]:
     try:
-        os.scandir(folder).close()  # of whose errors `glob` makes nothing
+        os.scandir(folder).close()  # `glob` would ignore its errors
     except OSError as error:
         if error.errno in ABSENT:
             return []

@@ -1,4 +1,4 @@
-"""What makes two runs the same: the settings that results depend on."""
+"""What makes two runs the same: the settings on which results depend."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from exneat_cli.records.plain import dotted
 
 NOT_HASHED = ("executor", "output", "name", "resume", "checkpoint_every", "tracker", "generations")
-"""Settings that say where and how to run, not what comes out; and the length, since a run may be made longer."""
+"""Settings that say where and how to run, not what comes out; and the length, since a run may be extended."""
 
 
 def configuration_hash(configuration: Mapping[str, Any], *, with_seed: bool = True) -> str:
-    """SHA-256, in hex, of the settings that results depend on, but for the number of generations.
+    """SHA-256, in hex, of the settings on which results depend, except the number of generations.
 
     Without the seed, all runs of one variant share a hash.
     """

@@ -10,7 +10,7 @@ from exneat_cli.records.plain import Count, Real, Word
 
 MANIFEST_FORMAT = 4
 OLDER_FORMAT = 3
-"""Read too, but not where it tells of `CHANGED_WORLDS`."""
+"""Can be read too, except for the tasks in `CHANGED_WORLDS`."""
 CHANGED_WORLDS = ("foraging", "hunting")
 """Tasks in which the same settings meant something else before format 4: p_c was decay, not persistence."""
 RUNNING: Final = "running"
@@ -22,7 +22,7 @@ INTERRUPTED: Final = "interrupted"
 class Score(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Means and standard deviations (population, over episodes) of one brain, and its fitness in each of them.
 
-    Runs of earlier versions do not have `steps_mean`, of control steps.
+    `steps_mean` is the mean number of control steps; runs of earlier versions do not have it.
     """
 
     episodes: Annotated[int, Meta(ge=1)]
@@ -36,7 +36,7 @@ class Score(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
 
 
 class Result(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What came of a run; a baseline has test figures alone.
+    """The results of a run; a baseline has only test figures.
 
     Attributes:
         training: best fitness of all generations.
@@ -55,8 +55,8 @@ class Result(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
 class Manifest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What manifest.json holds.
 
-    A killed process leaves the status `RUNNING`. A baseline is trained for 0 generations. Times are in UTC, `resumed`
-    are those at which the run went on. A `result` is there if the run is done.
+    A killed process leaves the status `RUNNING`. A baseline is trained for 0 generations. Times are in UTC;
+    `resumed` holds those at which the run was resumed. There is a `result` if the run is done.
     """
 
     format: int

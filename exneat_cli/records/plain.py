@@ -1,4 +1,4 @@
-"""From plain data, as JSON and YAML give it, to typed values, or to one line that says what does not fit."""
+"""Turning plain data from JSON and YAML into typed values, or into one line that says what does not fit."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from exneat_cli.errors import ExneatError, check_keys, check_section, shortened
 from exneat_cli.records.files import read_text
 
 Word = Annotated[str, Meta(pattern=r"^[\w -~]{1,200}\Z")]
-"""Letters of any script, digits, and what ASCII can print."""
+"""Letters of any script, digits, and printable ASCII."""
 Real = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 """Finite."""
 Count = Annotated[int, Meta(ge=0)]
 
 _Kind = TypeVar("_Kind")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""The same in C is ten times as fast, where PyYAML has it."""
+"""The loader in C, if PyYAML has it, is ten times as fast."""
 _NAMES = {"int": "a whole number", "float": "a number", "bool": "true or false", "str": "text"}
 _NAMES |= {"array": "a list", "object": "a section", "null": "nothing"}
-"""Ours for msgspec's types."""
+"""Our words for msgspec's types."""
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """Read keys with values; nothing in the file is run.
 
     Raises:
-        ExneatError: the file is missing, unreadable, no YAML, or holds something else.
+        ExneatError: the file is missing or unreadable, is not YAML, or holds something else.
     """
     try:
         content = yaml.load(read_text(path), Loader=_LOADER)
@@ -49,12 +49,12 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 
 def as_yaml(content: object) -> str:
-    """Write plain data as YAML that also readers of other versions take for what it is: ``1e5`` is text for PyYAML."""
+    """Write plain data as YAML that readers of other versions understand alike: ``1e5`` is text for PyYAML."""
     return yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
 def dotted(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by dotted name; a section within others is spelled out, and one that is empty left out."""
+    """Settings by dotted name; nested sections are flattened, and empty ones left out."""
     flat: dict[str, Any] = {}
     for name, value in values.items():
         if isinstance(value, Mapping):
@@ -66,7 +66,7 @@ def dotted(values: Mapping[str, Any]) -> dict[str, Any]:
 
 class _Dumper(yaml.SafeDumper):
     def represent_str(self, text: str) -> yaml.ScalarNode:
-        """Quote what reads as a number."""
+        """Quote text that reads as a number."""
         try:
             float(text.replace("_", ""))
         except ValueError:
@@ -81,7 +81,7 @@ def read_json(path: Path, kind: type[_Kind], *versions: int) -> tuple[_Kind, dic
     """Read a JSON object whose field ``format`` is among `versions`; returns it as the struct `kind`, and as it was.
 
     Raises:
-        ExneatError: the file is missing, unreadable, no JSON object or of another format, or a field is missing,
+        ExneatError: the file is missing, unreadable, not a JSON object or of another format, or a field is missing,
             unknown or unusable.
     """
     try:
@@ -100,9 +100,9 @@ def read_json(path: Path, kind: type[_Kind], *versions: int) -> tuple[_Kind, dic
 
 
 def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = True) -> _Kind:
-    """Plain data as `kind`, which is whatever `msgspec.convert` knows.
+    """Plain data as `kind`, any type that `msgspec.convert` knows.
 
-    If not `strict`, text that reads as a number is one, as in CSV files.
+    If not `strict`, text that reads as a number is taken as one, as in CSV files.
 
     Raises:
         ExneatError: it does not fit; names what is wrong: `where`, the field, what was expected and what came.
@@ -122,12 +122,12 @@ def converted(content: Any, kind: type[_Kind], where: str, *, strict: bool = Tru
 
 
 def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
-    """Make a dataclass of plain data; fields that are dataclasses, or tuples of them, are made of theirs.
+    """Make a dataclass from plain data, and likewise its fields that are dataclasses or tuples of them.
 
-    What is a dataclass already stays as it is. `prefix` is that of the keys in messages, e.g. ``noise.``.
+    Values that are dataclasses already stay as they are. `prefix` precedes keys in messages, e.g. ``noise.``.
 
     Raises:
-        ConfigError: `values` is no mapping, or whatever `kind` says of them.
+        ConfigError: `values` is not a mapping, or `kind` refuses its values.
         ExneatError: a key is unknown, named with the nearest valid one, or missing.
     """
     section = check_section(prefix.rstrip("."), values)
@@ -139,7 +139,7 @@ def build(kind: type[_Kind], values: object, prefix: str = "") -> _Kind:
             raise ExneatError(f"{prefix}{name}: is missing")
     try:
         hints = get_type_hints(kind)
-    except NameError:  # of a user's class, for type checkers alone, or of a program that is not this worker's
+    except NameError:  # a user's class has hints for type checkers only, or from a program that is not this worker's
         hints = {}
     names = {key: fields[key].name for key in section}
     return kind(**{name: _made(hints.get(name), section[key], f"{prefix}{key}") for key, name in names.items()})

@@ -17,24 +17,24 @@ _PACKAGES = ("neat-python", "numpy", "numba", "gymnasium", "mujoco", "hydra-core
 
 
 def versions() -> dict[str, str]:
-    """Versions of exneat, Python and the libraries that results depend on."""
+    """Versions of exneat, Python and the libraries on which results depend."""
     packages = {package: _version(package) for package in _PACKAGES}
     return {"exneat": exneat_cli.__version__, "python": platform.python_version(), **packages}
 
 
 def processor() -> str:
-    """The processor's name as the system tells it."""
+    """The processor's name as the system reports it."""
     return _told("/proc/cpuinfo", "model name") or platform.processor() or platform.machine()
 
 
 def available_memory() -> int | None:
-    """Bytes of memory that a new process may take without others being swapped out; None where it is not told."""
+    """Bytes of memory that a new process may take without others being swapped out; None if the system does not say."""
     told = _told("/proc/meminfo", "MemAvailable")
     return int(told.split()[0]) * 1024 if told else None
 
 
 def _told(path: str, name: str) -> str | None:
-    """The value behind the first such name in one of the kernel's files."""
+    """The value after the first such name in one of the kernel's files."""
     with contextlib.suppress(OSError):
         for line in Path(path).read_text(encoding="utf-8").splitlines():
             if line.startswith(name):
@@ -49,7 +49,7 @@ def git_commit() -> str | None:
         return None
     try:
         commit = _git(root, "rev-parse", "HEAD")
-        # Published rows and pages change while runs are made, and no run depends on them.
+        # Published rows and pages change while runs are made, but no run depends on them.
         changed = _git(root, "diff", "--name-only", "HEAD", "--", ".", ":!experiments/results", ":!docs")
     except (OSError, subprocess.SubprocessError):
         return None
@@ -58,6 +58,6 @@ def git_commit() -> str | None:
 
 def _git(root: Path, *arguments: str) -> str:
     command = ["git", "-C", str(root), *arguments]
-    # GIT_DIR and its like, which git sets for hooks, would name another repository than that directory's.
+    # GIT_DIR and similar variables, which git sets for hooks, would name another repository.
     own = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True, env=own).stdout.strip()

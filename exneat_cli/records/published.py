@@ -22,7 +22,7 @@ from exneat_cli.records.tables import read_cells, read_robustness, write_csv
 
 
 class PublishedRun(NamedTuple):
-    """What one finished run came to; fields are None where a run has no such figure, e.g. a baseline no training."""
+    """The figures of one finished run; a field is None if the run has no such figure, as a baseline has no training."""
 
     condition: Word
     variant: Word
@@ -49,7 +49,7 @@ class PublishedRun(NamedTuple):
 
     @property
     def place(self) -> tuple[str, str, int, str]:
-        """What there is one row of: condition, variant, seed and budget."""
+        """What identifies a row: condition, variant, seed and budget."""
         return self.condition, self.variant, self.seed, self.budget
 
     @property
@@ -74,9 +74,9 @@ def published_run(
     levels: Collection[tuple[str, float]] = (),
     sweep_episodes: int | None = None,
 ) -> PublishedRun:
-    """The row of a finished run, of which `place` names condition, variant and budget.
+    """The row of a finished run; `place` names its condition, variant and budget.
 
-    Of its robustness those (sweep, level) in `levels` count, with so many episodes.
+    Of its robustness, the row holds those (sweep, level) in `levels` that were tested in `sweep_episodes` episodes.
 
     Raises:
         ExneatError: a file of the run is missing or damaged, or it is not finished.
@@ -140,9 +140,9 @@ def read_published(path: Path) -> list[PublishedRun]:
 
 
 def publish(path: Path, rows: Sequence[PublishedRun], order: Callable[[PublishedRun], Any]) -> None:
-    """Add rows to a file, which they make if need be; a row replaces the old one of its place. Sorted by `order`.
+    """Add rows to a file, which is created if needed and sorted by `order`; a row replaces the old one of its place.
 
-    Several processes may publish at once: each waits for its turn. What is there already changes nothing.
+    Several processes may publish at once: each waits for its turn. Rows that are there already change nothing.
 
     Raises:
         ExneatError: the file is damaged, or cannot be written.

@@ -1,4 +1,4 @@
-"""The directory of one run: its files, its one writer, and whether a run may use it."""
+"""The directory of one run: its files, its single writer, and whether a run may use it."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from exneat_cli.records.plain import read_json, read_yaml
 
 _ELSEWHERE = "  remove it, or set name= or output= to another place"
 ABSENT = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG)
-"""Errors that say that nothing is there; by others nobody can tell."""
+"""Errors that mean that nothing is there; others leave that open."""
 _TRIES, _PAUSE = 3, 0.02
-"""How often a lock is asked for, and the seconds in between: `is_held` has it for less than a moment."""
+"""How often to try to get a lock, and the seconds in between: `is_held` holds it only for a moment."""
 
 
 @dataclass(unsafe_hash=True)
 class RunDirectory:
     """``<output>/<name>/<variant>-s<seed>-<hash>``, where one run keeps its files.
 
-    docs/run-directory.md says what each of them holds. Some are not there in every run: a baseline has no history,
-    champion and hall of fame, and only grid worlds have tiles.
+    docs/run-directory.md says what each of them holds. Not every run has all of them: a baseline has no history,
+    champion or hall of fame, and only grid worlds have tiles.
     """
 
     path: Path
@@ -63,13 +63,13 @@ class RunDirectory:
     def claimed(
         self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool
     ) -> Iterator[bool]:
-        """Hold the directory, made if need be, against other processes; yields whether the run is finished already.
+        """Hold the directory, created if needed, against other processes; yields whether the run is already finished.
 
         Args:
             full_hash: the run's `configuration_hash`.
             configuration: all its settings, as plain data.
-            resume: whether an unfinished run may be gone on with.
-            lengthen: whether a finished one may be made longer.
+            resume: whether an unfinished run may be continued.
+            lengthen: whether a finished one may be extended.
 
         Raises:
             ExneatError: the directory cannot be made or used, or holds something else than this run.
@@ -98,7 +98,7 @@ class RunDirectory:
         try:
             _lock(self.path, descriptor)
             if not _is_still(self.path, descriptor):
-                raise ExneatError(f"{self.path}: was removed by another process at this moment; try again")
+                raise ExneatError(f"{self.path}: has just been removed by another process; try again")
             yield
         finally:
             os.close(descriptor)
@@ -113,7 +113,7 @@ class RunDirectory:
 
     def _may_be_used(self, full_hash: str, configuration: Mapping[str, Any], *, resume: bool, lengthen: bool) -> bool:
         if not self.manifest.exists():
-            # A run that was killed before its manifest was written leaves temporary files alone.
+            # A run that was killed before its manifest was written leaves only temporary files.
             if all(path.suffix == ".tmp" for path in self.path.iterdir()):
                 return False
             came = "expected a new directory or a run, got one without manifest.json"
@@ -126,44 +126,44 @@ class RunDirectory:
             return True
         if asked < there:
             raise ExneatError(
-                f"{self.path}: holds a run of {there} generations, and {asked} are asked for\n"
+                f"{self.path}: holds a run of {there} generations, but {asked} are asked for\n"
                 "  generations= can only be raised; set name= to another folder for a shorter run"
             )
         if manifest.status == FAILED and not self.history.exists():
             return False  # it failed before anything was trained, so there is nothing to lose
         if not (lengthen if is_done else resume):
             holds = f"a finished run of {there} generations" if is_done else f"an unfinished run ({manifest.status})"
-            fix = f"add resume=true to go on from where it stopped, or exneat resume run={self.path}"
+            fix = f"add resume=true to continue where it stopped, or use exneat resume run={self.path}"
             raise ExneatError(f"{self.path}: holds {holds}\n  {fix}")
         return False
 
     def _difference(self, configuration: Mapping[str, Any]) -> str:
-        """What the run that is there has otherwise, in words."""
+        """How the settings of the run that is there differ, in words."""
         there, here = self._identity(), identity(configuration)
         if there is None:
             return "its config.yaml cannot be read"
         keys = [key for key in sorted({*there, *here}) if there.get(key) != here.get(key)]
         named = [f"{key} is {there.get(key, 'unset')} there, {here.get(key, 'unset')} here" for key in keys]
-        return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest is of another one"
+        return "; ".join(named[:3] + ["..."] * (len(named) > 3)) or "its manifest belongs to another one"
 
     def is_alike(self, configuration: Mapping[str, Any]) -> bool:
-        """Whether the run has these settings, word for word."""
+        """Whether the run has exactly these settings."""
         return self._identity() == identity(configuration)
 
     def _identity(self) -> dict[str, Any] | None:
-        """The settings in config.yaml that results depend on; None where they cannot be read."""
+        """The settings in config.yaml on which results depend; None if they cannot be read."""
         try:
             return identity(read_yaml(self.config))
         except (ExneatError, TypeError, ValueError):
             return None
 
     def begin(self, config: str, manifest: Manifest, files: Mapping[str, bytes]) -> None:
-        """Write the first files, the manifest before all; if that fails, a directory that was new is gone again.
+        """Write the first files, beginning with the manifest; if that fails, a directory that was new is removed again.
 
         Args:
-            config: what config.yaml holds.
+            config: the content of config.yaml.
             manifest: of the run.
-            files: what the task is made of, to keep below `model` by their paths.
+            files: files that the task is made of, by path, to be kept below `model`.
 
         Raises:
             ExneatError: they cannot be written.
@@ -189,7 +189,7 @@ class RunDirectory:
         """Refuse a directory in which no file can be written, before anything is computed for it.
 
         Raises:
-            ExneatError: that is so.
+            ExneatError: no file can be written.
         """
         trial = self.path / ".trial"
         write_whole(trial, b"")
@@ -199,7 +199,7 @@ class RunDirectory:
         """Whether the directory holds a run.
 
         Raises:
-            ExneatError: nobody can tell, since it may not be read.
+            ExneatError: the directory cannot be read, so it is unknown.
         """
         try:
             os.stat(self.manifest)
@@ -229,14 +229,14 @@ class RunDirectory:
         """
         manifest, _ = read_json(self.manifest, Manifest, MANIFEST_FORMAT, OLDER_FORMAT)
         if manifest.format == OLDER_FORMAT and manifest.task in CHANGED_WORLDS:
-            why = f"task={manifest.task} was another world then"
+            why = f"task={manifest.task} was a different world then"
             raise ExneatError(f"{self.manifest}: expected format {MANIFEST_FORMAT}, got {OLDER_FORMAT}: {why}")
         if manifest.status == DONE and manifest.result is None:
             raise ExneatError(f"{self.manifest}: damaged: result: expected the figures of a finished run, got nothing")
         return manifest
 
     def status(self, manifest: Manifest) -> str:
-        """The status that its `manifest` says, but "killed" if that is running and no process holds the run."""
+        """The status in its `manifest`, but "killed" if that is "running" and no process holds the run."""
         return "killed" if manifest.status == RUNNING and not self.is_held() else manifest.status
 
     def read_result(self) -> Result:
@@ -266,7 +266,7 @@ def _lock(directory: Path, descriptor: int) -> None:
                 raise ExneatError(f"{directory}: another process is writing there ({holder})") from None
             time.sleep(_PAUSE)
         except OSError as error:
-            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that knows flock"
+            why = f"{directory}: cannot be locked: {error.strerror}; set output= to a disk that supports flock"
             raise ExneatError(why) from error
 
 
@@ -277,7 +277,7 @@ def _is_still(directory: Path, descriptor: int) -> bool:
 
 
 def _holder(descriptor: int) -> str:
-    """Id of the process that holds the lock, where the kernel tells."""
+    """Id of the process that holds the lock, if the kernel tells."""
     with contextlib.suppress(OSError):
         inode = os.fstat(descriptor).st_ino
         for fields in map(str.split, Path("/proc/locks").read_text(encoding="ascii").splitlines()):

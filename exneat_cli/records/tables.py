@@ -1,4 +1,4 @@
-"""Tables in CSV, history.csv and robustness.csv among them; docs/run-directory.md says what their columns hold."""
+"""CSV tables, among them history.csv and robustness.csv; docs/run-directory.md says what their columns hold."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ HISTORY_COLUMNS = tuple(name for name in COLUMNS if name not in ("species", "ext
 """The columns that every history has."""
 
 UNPERTURBED = "none"
-"""Parameter of the row that tells how a baseline does when nothing is perturbed."""
+"""Parameter of the row that holds a baseline's score when nothing is perturbed."""
 
 
 class RobustnessRow(NamedTuple):
-    """How a champion or a baseline did at one level of one sweep, its `parameter`, or `UNPERTURBED`."""
+    """The score of a champion or a baseline at one level; `parameter` is the sweep's name, or `UNPERTURBED`."""
 
     variant: str
     run_seed: Count
@@ -43,7 +43,7 @@ class RobustnessRow(NamedTuple):
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a table; floats keep every digit, so equal numbers are equal bytes.
+    """Write a table; floats keep every digit, so equal numbers give equal bytes.
 
     Raises:
         ExneatError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""Films as files, by ffmpeg, which imageio-ffmpeg brings along."""
+"""Writing films to files with ffmpeg, which imageio-ffmpeg provides."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def check_video_library() -> None:
     """Refuse to begin without ffmpeg.
 
     Raises:
-        ExneatError: imageio-ffmpeg or its ffmpeg is not there.
+        ExneatError: imageio-ffmpeg or its ffmpeg is missing.
     """
     _ffmpeg()
 
@@ -40,20 +40,20 @@ def _ffmpeg() -> str:
 
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError) as error:
-        raise ExneatError(f"expected ffmpeg by imageio-ffmpeg, got: {error}\n  pip install 'exneat[video]'") from error
+        raise ExneatError(f"expected imageio-ffmpeg's ffmpeg, got: {error}\n  pip install 'exneat[video]'") from error
 
 
 def write_video(path: Path, frames: Generator[NDArray[np.uint8]], fps: float, form: str) -> int:
-    """Write frames, (height, width, 3) each, of a format in `VIDEO_FORMATS`; returns how many there were.
+    """Write frames, (height, width, 3) each, in a format of `VIDEO_FORMATS`; returns how many there were.
 
     Raises:
-        ExneatError: ffmpeg is not there or failed, or the file cannot be written; what was there before stays.
+        ExneatError: ffmpeg is missing or failed, or the file cannot be written; an older file is kept then.
     """
     program = _ffmpeg()
     make_directory(path.parent)
     try:
         with replacing(path) as temporary, closing(frames):
-            temporary.touch()  # refused before anything is drawn
+            temporary.touch()  # fails before anything is drawn
             return _encode(program, frames, fps, form, temporary)
     except _EncodingError as error:
         fix = "check the disk, or pip install --force-reinstall imageio-ffmpeg"
@@ -72,7 +72,7 @@ def _encode(program: str, frames: Generator[NDArray[np.uint8]], fps: float, form
     command = [program, "-loglevel", "error", "-y", *raw, *VIDEO_FORMATS[form], "-f", form, str(path)]
     count = 0
     with tempfile.TemporaryFile() as said:
-        # A session of its own: Ctrl-C is not for ffmpeg, which would call half a film a whole one.
+        # A session of its own: on Ctrl-C, ffmpeg would finish half a film as if it were whole.
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=said, stderr=said, start_new_session=True)
         assert process.stdin is not None
         try:

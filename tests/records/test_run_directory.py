@@ -127,7 +127,7 @@ def test_a_run_may_be_made_longer_by_resume_and_never_shorter(tmp_path: Path, st
     if status == "done":
         with pytest.raises(ExneatError, match=r"holds a finished run of 5 generations\n.*resume=true"):
             claim(run, resume=True, lengthen=False, generations=6)
-    with pytest.raises(ExneatError, match="holds a run of 5 generations, and 4 are asked for"):
+    with pytest.raises(ExneatError, match="holds a run of 5 generations, but 4 are asked for"):
         claim(run, resume=True, generations=4)
 
 
@@ -140,7 +140,7 @@ def test_a_manifest_of_the_last_format_is_read_where_worlds_are_as_they_were(tmp
 @pytest.mark.parametrize(
     ("entries", "named"),
     [
-        ({"format": 3, "task": "hunting"}, "expected format 4, got 3: task=hunting was another world then"),
+        ({"format": 3, "task": "hunting"}, "expected format 4, got 3: task=hunting was a different world then"),
         ({"format": 2}, "expected format 4, got 2: another version of exneat wrote it"),
         ({"status": "\x1b[31mdone"}, "damaged: status: invalid enum value"),
         ({"wurst": 1}, "damaged: object contains unknown field wurst"),
@@ -218,5 +218,5 @@ def test_a_directory_that_was_removed_while_it_was_locked_is_not_held(
         run.path.mkdir()
 
     monkeypatch.setattr("fcntl.flock", remove_and_make_anew)
-    with pytest.raises(ExneatError, match="was removed by another process"), run.held():
+    with pytest.raises(ExneatError, match="has just been removed by another process"), run.held():
         pass

@@ -27,7 +27,7 @@ _PRELOADED = ["tests.torture.races", "exneat_cli.rollouts.episode"]
 _RACE = RunSettings(
     task=TrackMaze(), generations=3, population=10, episodes=2, validation_episodes=1, test_episodes=1, resume=False
 )
-_REFUSED = re.compile(r"another process is writing there \(process id (\d+)\)|holds an unfinished run|was removed by")
+_REFUSED = re.compile(r"another process is writing there \(process id (\d+)\)|holds an unfinished run|been removed by")
 
 
 class _Said(NamedTuple):

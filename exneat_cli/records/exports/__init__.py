@@ -1,4 +1,4 @@
-"""Champions for use elsewhere: one file for each format, loaded when it is asked for."""
+"""Champions for use without exneat: one module per format, loaded when needed."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def exported(
     evolution: EvolutionSettings,
     place: Path,
 ) -> dict[Path, str | bytes]:
-    """What the files of a champion in a format of `FORMATS` hold; nothing is written.
+    """The contents of a champion's files in a format of `FORMATS`; nothing is written.
 
     Args:
-        format: which.
+        format: one of `FORMATS`.
         champion: the team, from `read_champion`.
         task: what it was trained for.
         evolution: the settings that it evolved under.
-        place: the file; of ``neat`` the directory.
+        place: the file; for ``neat``, the directory.
 
     Raises:
         ExneatError: the format cannot hold this champion, or its library is not installed.

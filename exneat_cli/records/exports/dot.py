@@ -12,7 +12,7 @@ _POSITIVE, _NEGATIVE = "#0072b2", "#d55e00"
 
 
 def files(champion: Champion, task: Task, evolution: EvolutionSettings) -> dict[str, str]:
-    """The file's content; see `exneat_cli.records.exports.export`."""
+    """The file's content; see `exneat_cli.records.exports.exported`."""
     lines = ["digraph champion {", "  rankdir=BT; node [fontsize=9]; edge [fontsize=7, arrowsize=0.5];"]
     used = sorted({entry for module in champion.plan.modules for entry in module.sensors})
     lines += [f"  s{entry} [label={_text(champion.sensors[entry])}, shape=plaintext];" for entry in used]

@@ -15,7 +15,7 @@ from exneat_cli.tasks import Task
 
 
 def files(champion: Champion, task: Task, evolution: EvolutionSettings) -> dict[str, str]:
-    """Contents of the directory's files; see `exneat_cli.records.exports.export`.
+    """Contents of the directory's files; see `exneat_cli.records.exports.exported`.
 
     Raises:
         ExneatError: a module reads another one.

@@ -1,4 +1,4 @@
-"""A champion as an ONNX graph in double precision: frames and signs inside, what it remembers as input and output.
+"""A champion as an ONNX graph in double precision: frames and signs are inside; its memory is an input and an output.
 
 Inputs are ``observation``, (N, readings), for N robots at once, and, if the networks remember, ``state``, (N, values),
 all 0 when an episode begins. Outputs are ``controls``, (N, actuators), and ``next_state``, the ``state`` of the next
@@ -20,11 +20,11 @@ from exneat_cli.records.exports.portable import Plain, adapter_of, portable
 from exneat_cli.tasks import Task
 
 OPSET, IR_VERSION = 17, 8
-"""Of 2022: what runtimes have had for long."""
+"""From 2022, so that older runtimes support them."""
 
 
 def files(champion: Champion, task: Task, evolution: EvolutionSettings) -> dict[str, bytes]:
-    """The file's content; see `exneat_cli.records.exports.export`.
+    """The file's content; see `exneat_cli.records.exports.exported`.
 
     Raises:
         ExneatError: onnx is not installed.
@@ -89,7 +89,7 @@ class _Graph:
         return self.picked(values, np.arange(first, first + count))
 
     def shaped(self, values: str, *shape: int) -> str:
-        """Values of another shape; the first size is that of the batch."""
+        """Values in another shape; the first size is that of the batch."""
         return self.node("Reshape", values, self.constant([-1, *shape], np.int64))
 
     def model(self, inputs: Sequence[tuple[str, int]], outputs: Sequence[tuple[str, int]]) -> Any:
@@ -132,7 +132,7 @@ def _step(graph: _Graph, data: Plain, state: Sequence[int]) -> tuple[str, _Value
     sensed = _sensed(graph, data["frames"], observation)
     size = len(data["frames"]["pick"]) if data["frames"] else data["observation_size"]
     values = _Values(graph, sensed, size)
-    # A slot that nobody writes holds 0, such as that of actuators that nobody drives.
+    # A slot that is never written holds 0, such as that of an actuator that nothing drives.
     zero = graph.node("Mul", graph.columns(observation, 0), graph.constant(0.0))
     values.add(zero, [-1])
     if state:

@@ -23,7 +23,7 @@ def portable(champion: Champion, task: Task) -> Plain:
     step wrote, or the previous step; they never read each other.
 
     Raises:
-        ExneatError: the task turns readings or actions by code of its own.
+        ExneatError: the task transforms readings or actions with code of its own.
     """
     brain, adapter = champion.brain(), adapter_of(task)
     bounded = np.isfinite(task.observation_limits[1])
@@ -49,8 +49,8 @@ def adapter_of(task: Task) -> Adapter:
         return task.adapter()
     simulation = task.open(training=False)
     if simulation.sense is not None or simulation.drive is not None:
-        fix = "a method adapter() of its class would say as data what they do, see exneat_cli.tasks.HasAdapter"
-        raise ExneatError(f"task {task.name}: has functions sense or drive, which no file can hold\n  {fix}")
+        fix = "give its class a method adapter() that says as data what they do, see exneat_cli.tasks.HasAdapter"
+        raise ExneatError(f"task {task.name}: has functions sense or drive, which a file cannot hold\n  {fix}")
     ones = np.ones(len(task.actuator_names))
     return Adapter(task.sensor_names, None, signs=ones, middle=0.0 * ones, span=ones, bounded=False)
 
@@ -92,7 +92,7 @@ def _frames(frames: Any, task: Task) -> Plain:
     pick[frames.scalar_to], sign[frames.scalar_to] = frames.scalar_from, frames.scalar_sign
     height = task.observation_size
     for frame, places in enumerate(frames.views):
-        # The height is the same from everywhere; of the four triples each comes from all frames.
+        # The height is the same in every frame; each of the four triples comes once per frame.
         seen = [height, *(height + 1 + 3 * (count * kind + frame) + axis for kind in range(4) for axis in range(3))]
         pick[places[places >= 0]] = np.array(seen)[places >= 0]
     for vector, first in enumerate(frames.vector_to):

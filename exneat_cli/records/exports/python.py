@@ -1,4 +1,4 @@
-"""A champion as one Python file that needs NumPy alone."""
+"""A champion as one Python file that needs only NumPy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WIDTH = 120
 
 
 def files(champion: Champion, task: Task, evolution: EvolutionSettings) -> dict[str, str]:
-    """The file's content; see `exneat_cli.records.exports.export`."""
+    """The file's content; see `exneat_cli.records.exports.exported`."""
     code = inspect.getsource(standalone).removeprefix(f'"""{standalone.__doc__}"""\n')
     code = code.replace("def __init__(self, data):", "def __init__(self, data=DATA):")
     head = [f"# {line}".rstrip() for line in _description(champion, task)]
