@@ -1,4 +1,4 @@
-"""What stands below a table: what it rests on, what its columns mean, and what its numbers cannot tell."""
+"""The text below a table: what it rests on, what its columns mean, and what its numbers cannot show."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from exneat_cli.analysis.statistics import least_p
 from exneat_cli.analysis.study import Study, budget_sentence, few_runs_sentence, number_range
 
 SIGNIFICANT = 0.05
-"""Where the fewest runs of a table can reach no p below it, its caption says so."""
+"""If the fewest runs of a table cannot reach a p below this, its caption says so."""
 _MEANINGS = {
     "training": "final best so far",
     "test": "the champion on test episodes",
@@ -22,7 +22,7 @@ _MEANINGS = {
 def table_sentences(study: Study, lines: pd.DataFrame, quantities: Collection[str]) -> Iterable[str]:
     """What a table rests on and what its columns, some of `QUANTITIES`, mean.
 
-    `lines` are those of the study's summary that it shows, maybe with a column ``published``.
+    `lines` are those of the study's summary that it shows, with or without a column ``published``.
     """
     conditions, variants = list(lines["condition"].unique()), list(lines["variant"].unique())
     is_published = "published" in lines and bool((lines["published"] != "").any())

@@ -1,4 +1,4 @@
-"""The catalogue of figures and tables: what experiments/catalogue.yaml may say, and what comes of an entry."""
+"""The catalogue of figures and tables: what experiments/catalogue.yaml may contain, and what is built from an entry."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class Panel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FigurePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One figure: name (its files are called so), kind (of `FIGURE_KINDS`), title, and panels from left to right.
+    """One figure: name (also of its files), kind (of `FIGURE_KINDS`), title, and panels from left to right.
 
-    Of the trained variants it shows those in `variants`; without any, all.
+    Of the trained variants it shows those in `variants`, or all if that is empty.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ``efficiency`` (first generation, from 1, at which the mean best so far reaches the final mean of the first
             variant), or ``robustness``.
         sweep, level, value: of a robustness sweep, with one of `VALUES`; needed there alone.
-        minus: a variant whose mean in the same condition is taken away, e.g. a baseline.
+        minus: a variant whose mean in the same condition is subtracted, e.g. a baseline.
     """
 
     of: str
@@ -92,7 +92,7 @@ class TableRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TablePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="table"):
-    """One table: name (its files are called so), title, columns by name, rows from top to bottom, and a note below."""
+    """One table: name (also of its files), title, columns by name, rows from top to bottom, and a note below."""
 
     name: str
     title: str
@@ -107,13 +107,13 @@ class TablePlan(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
 
 
 class Built(NamedTuple):
-    """One figure or table that lies on disk.
+    """One figure or table on disk.
 
     Attributes:
         name, title, caption: what it is called, what it shows in a few words, and the sentences below it.
         paths: its files.
         header, rows: the cells of a table, as printed; empty for a figure.
-        strips: where on the picture of a figure which values are.
+        strips: which values are where on the picture of a figure.
     """
 
     name: str
@@ -144,7 +144,7 @@ def read_catalogue(path: Path) -> dict[str, FigurePlan | TablePlan]:
 
 
 def _nearest(message: str) -> str:
-    """Of a message about an unknown key: what was probably meant."""
+    """For a message about an unknown key: what was probably meant."""
     unknown = re.search(r"(?:(\w+)\[.*\]: )?object contains unknown field (.*)", message)
     if not unknown:
         return ""

@@ -36,7 +36,7 @@ def edges_of(champion: Champion) -> list[Edge]:
 
 
 def links_of(champion: Champion) -> list[tuple[Node, Node, bool]]:
-    """Source, target (an input) and whether it is delayed of every link between modules, but for deleted sources."""
+    """Source, target (an input) and whether it is delayed, for every link between modules whose source exists."""
     hidden = set(hidden_of(champion))
     return [
         ((pin.module, pin.index), (m, -1 - k), pin.delayed)
@@ -62,15 +62,15 @@ def _reachable(found: set[Node], steps: Collection[tuple[Node, Node]]) -> set[No
 
 
 def strongest_edges(champion: Champion) -> list[Edge]:
-    """The enabled connections that a picture shows, the strongest last: at most `MOST_EDGES`, or they make a mat."""
+    """The enabled connections that a picture shows, the strongest last: at most `MOST_EDGES`, to stay readable."""
     return sorted(edges_of(champion), key=lambda edge: abs(edge[2]))[-MOST_EDGES:]
 
 
 def depths(hidden: Iterable[Node], edges: Collection[Edge]) -> dict[Node, int]:
-    """Find the layers of inputs, which is 0, and of hidden nodes: one more than that of their deepest source.
+    """Find the layers of inputs (0) and of hidden nodes (one more than that of their deepest source).
 
-    Connections out of outputs and those that close a cycle do not count. In a cycle the node comes
-    first that inputs or placed nodes reach, then the one that waits for fewest, then the lowest.
+    Connections out of outputs and those that close a cycle do not count. In a cycle, nodes
+    that inputs or placed nodes reach come first, then those that wait for the fewest sources, then the lowest.
     """
     found = {source: 0 for source, _, _ in edges if source[1] < 0}
     sources: dict[Node, set[Node]] = {node: set() for node in hidden}

@@ -1,4 +1,4 @@
-"""Values of curves, for a page to show where the pointer rests on their picture."""
+"""Values of curves, which a page shows where the pointer rests on their picture."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 MOST_STRIPS = 40
-"""Places per panel at which values are shown; a pointer hardly hits narrower ones."""
+"""Strips per panel with values of their own; narrower ones would be hard to hit with a pointer."""
 
 
 class Strip(NamedTuple):
-    """An upright part of a picture, in percent of its width and height from the upper left, and the values there."""
+    """An upright strip of a picture, in percent of its width and height from the upper left, and the values there."""
 
     left: float
     top: float

@@ -1,4 +1,4 @@
-"""Frames of a film: agents side by side, with captions, and beside each its networks with the values of their nodes."""
+"""Frames of a film: agents side by side, with captions, each next to its networks with the values of their nodes."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ class Panel:
 
 
 class Still(NamedTuple):
-    """What one agent's part of a frame shows: its picture, what stands above and below, and its networks, if any.
+    """One agent's part of a frame: its picture, the texts above and below it, and its networks, if any.
 
-    These are 2 `BAR` higher than the picture.
+    The networks are 2 `BAR` taller than the picture.
     """
 
     picture: Pixels
@@ -84,7 +84,7 @@ class Still(NamedTuple):
 
 
 def frame(stills: Sequence[Still]) -> Pixels:
-    """Agents in rows and columns, whose width and height are even numbers of pixels, as codecs want it."""
+    """Agents in rows and columns; width and height are even numbers of pixels, as codecs require."""
     tiles = []
     for still in stills:
         picture = _captioned(still.picture, still.title, still.caption)
@@ -108,7 +108,7 @@ def fitted(picture: Pixels, width: int, height: int) -> Pixels:
 
 
 def as_jpeg(picture: Pixels) -> bytes:
-    """A picture as a file."""
+    """A picture as the bytes of a JPEG file."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "JPEG", quality=85)
     return file.getvalue()

@@ -1,6 +1,6 @@
-"""index.html: the whole report on one page that works without network, and without scripts too.
+"""index.html: the whole report on one page that works without a network, and even without scripts.
 
-What it shows is gathered here; how, the templates beside this file say.
+This module gathers what the page shows; the templates beside it say how.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _SECTIONS = {
     "Chapter 5: tables and figures": ("table-5.", "figure-5."),
     "Chapter 7: figures": ("figure-7.",),
     "Comparisons": ("comparison-",),
-    "Others": ("",),
+    "Other tables and figures": ("",),
 }
-"""Title -> beginnings of the names of what stands there, in this order."""
+"""Title -> beginnings of the names of what the section shows, in this order."""
 _NUMBER = re.compile(r"[\[<>]?-?\d[^A-Za-z]*")
 
 
 def write_index(
     directory: Path, studies: Mapping[str, Study], artefacts: Sequence[Built], missing: Mapping[str, str]
 ) -> Path:
-    """Write ``index.html`` into `directory`, from where files are linked; the same data gives the same bytes.
+    """Write ``index.html`` into `directory`, with links relative to it; the same data give the same bytes.
 
     Artefacts are shown in their order within each section. `studies` are by the name of their experiment, `missing`
     holds the text of the `MissingRunsError` of what could not be built, by its name.
@@ -61,7 +61,7 @@ def write_index(
 
 
 def _sections(artefacts: Sequence[Built]) -> dict[str, list[Built]]:
-    """Sections that hold something; an artefact stands in the first that its name fits."""
+    """The sections that are not empty; an artefact is in the first one that its name fits."""
     left, found = list(artefacts), {}
     for title, prefixes in _SECTIONS.items():
         found[title] = [each for prefix in prefixes for each in left if each.name.startswith(prefix)]
@@ -75,7 +75,7 @@ def _heading(built: Built) -> str:
 
 
 def _picture(paths: Sequence[Path]) -> str:
-    """The address of the PNG, with the picture itself inside; nothing if there is none."""
+    """The PNG as a data URL; empty if there is none."""
     for path in paths:
         if path.suffix == ".png":
             try:
@@ -86,7 +86,7 @@ def _picture(paths: Sequence[Path]) -> str:
 
 
 def _facts(study: Study) -> dict[str, Any]:
-    """What the runs of a study took, by variant and in all."""
+    """What the runs of a study took, by variant and in total."""
     rows = []
     for variant, label in study.variants.items():
         seeds = [run.seed for run in study.runs if run.variant == variant]
@@ -113,7 +113,7 @@ def _facts(study: Study) -> dict[str, Any]:
 
 
 def _films(study: Study) -> dict[str, Path]:
-    """Of each variant in each condition, in words, the film of the best filmed run on validation episodes."""
+    """For each variant and condition, in words, the film of the filmed run that was best on validation episodes."""
     best: dict[str, tuple[float, Path]] = {}
     for run, manifest in study.finished.items():
         film, result = run.directory.plots / "champion.mp4", manifest.result

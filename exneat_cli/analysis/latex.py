@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"[<>+-]?\d[\d.]*")
 def latex_table(title: str, caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     r"""Write a ``tabular`` for ``\input`` within a ``table``; needs ``\usepackage{booktabs}``.
 
-    Numbers stand right, all else left, and room is left where the first cell changes. `caption` is a comment above.
+    Numbers are aligned right, all else left, with space where the first cell changes. `caption` is a comment above.
     """
     columns = list(zip(*rows, strict=True)) or [()] * len(header)
     sides = "".join(

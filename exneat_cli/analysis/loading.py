@@ -1,4 +1,4 @@
-"""Loading matplotlib, whatever its user has set: figures are drawn without windows, by `exneat_cli.analysis.styles`."""
+"""Loading matplotlib whatever the user has set: figures are drawn without windows, see `exneat_cli.analysis.styles`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _chosen = os.environ.pop("MPLBACKEND", None)
 try:
     import matplotlib
 except (ValueError, OSError) as error:
-    fix = "python -c 'import matplotlib' tries the same; move the matplotlibrc away that it reads"
+    fix = "python -c 'import matplotlib' does the same; move away the matplotlibrc that it reads"
     raise ExneatError(f"matplotlib cannot be loaded: {error}\n  {fix}") from error
 finally:
     if _chosen is not None:

@@ -27,15 +27,15 @@ from exneat_cli.records import RunDirectory
 from exneat_cli.records.champion import Champion, read_champion
 
 POSITIVE, NEGATIVE = "#00508a", "#ee7733"
-"""Of weights; one is dark and one light, so that grey print tells them apart."""
+"""Colours of weights, one dark and one light, so that they differ in grey print."""
 MODULE_COLOURS = (styles.GREEN, styles.ORANGE, styles.PURPLE, styles.SKY, styles.OLIVE, styles.BLACK)
-"""Of the boxes, and of the links that leave them; none is a colour of weights."""
+"""Colours of the boxes and of the links that leave them; none is a colour of weights."""
 FAINT = 0.13
-"""Opacity of what has no part in what the agent does."""
+"""Opacity of what has no effect on what the agent does."""
 _GREY, _INNER = styles.GREY, "#999999"
-_LEAST_ROOM = 5.4  # points from one input to the next that names need
+_LEAST_ROOM = 5.4  # points between inputs that names need
 _BOW = 0.15  # how far links swing aside, as a share of their length; there and back swing to different sides
-_ALIKE = 0.98  # share of the weights whose widths differ: beside a single outlier all others would vanish
+_ALIKE = 0.98  # share of the weights drawn with different widths: next to an outlier, all others would vanish
 _MANY_LINKS, _MANY_EDGES = 40, 200
 
 
@@ -54,7 +54,7 @@ def champion_of(run: RunDirectory) -> Champion:
     """Read the champion of a run.
 
     Raises:
-        ExneatError: it has none, as baselines and unfinished runs have none, or its file is damaged.
+        ExneatError: it has none, like baselines and unfinished runs, or its file is damaged.
     """
     if not run.champion.exists():
         raise ExneatError(f"{run.path}: expected a champion, got none: baselines and unfinished runs have no network")
@@ -66,7 +66,7 @@ def champions_figure(
 ) -> Figure:
     """Draw champions side by side, with a legend; each with a title of its own, or none.
 
-    Their size is what they need, on paper too.
+    Their size is what they need, even on paper.
     """
     widths, heights = zip(*(layout.natural_size(champion) for champion in champions), strict=True)
     width, height = sum(widths) + 0.3 * (len(widths) - 1), max(heights)
@@ -87,7 +87,7 @@ def champions_figure(
 def draw_champion(axes: Axes, champion: Champion, width: float, height: float, *, with_nodes: bool = True) -> Places:
     """Draw a champion on empty axes, which lose their frame and ticks; text is made to fit their size in inches.
 
-    Returns the places of the nodes; without them, and the names of inputs, somebody else is to draw them there.
+    Returns the places of the nodes; if not `with_nodes`, nodes and names of inputs are left for the caller to draw.
     """
     boxes, places = layout.lay_out(champion, width, height, named=with_nodes)
     used = graph.used_nodes(champion)
@@ -106,7 +106,7 @@ def draw_champion(axes: Axes, champion: Champion, width: float, height: float, *
 
 
 def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
-    """Say what lines and shapes mean, as far as they occur in one of `champions`."""
+    """Entries that explain the lines and shapes that occur in `champions`."""
     thickest = " and ".join(f"{_thick_from(champion):.2g}" for champion in champions)
     hidden = sum(len(graph.edges_of(champion)) - len(graph.strongest_edges(champion)) for champion in champions)
     delays = {is_delayed for champion in champions for _, _, is_delayed in graph.links_of(champion)}
@@ -122,8 +122,8 @@ def legend_entries(champions: Sequence[Champion]) -> list[Artist]:
         "hidden node": _dot(_INNER),
         "output": _dot(_GREY),
         **({"loop or arc: to itself, sideways or back": _dot("none", markersize=9.0)} if loops else {}),
-        **({"link, coloured as the module it leaves": {}} if False in delays else {}),
-        **({"link, coloured likewise, one step late": {"linestyle": "--"}} if True in delays else {}),
+        **({"link, coloured like its source module": {}} if False in delays else {}),
+        **({"link, one step late, coloured likewise": {"linestyle": "--"}} if True in delays else {}),
     }
     return [Line2D([], [], label=label, **{"color": _GREY, **look}) for label, look in entries.items()]
 
@@ -133,7 +133,7 @@ def _dot(face: str, **look: Any) -> styles.Look:
 
 
 def _colour(m: int) -> str:
-    """A colour of its own for every module: beyond `MODULE_COLOURS` the same ones, each time halfway nearer to grey."""
+    """A distinct colour for every module: beyond `MODULE_COLOURS` they repeat, each time halfway closer to grey."""
     turn, k = divmod(m, len(MODULE_COLOURS))
     share = 0.5**turn
     red, green, blue = (share * own + (1.0 - share) * 0.75 for own in to_rgb(MODULE_COLOURS[k]))
@@ -168,12 +168,12 @@ def _draw_links(axes: Axes, champion: Champion, places: Places, used: set[Node])
 
 
 def _thick_from(champion: Champion) -> float:
-    """Weights from here on are drawn alike."""
+    """The magnitude beyond which weights are drawn equally thick."""
     return float(np.quantile([abs(weight) for _, _, weight in graph.edges_of(champion)] or [0.0], _ALIKE))
 
 
 def _draw_edges(axes: Axes, champion: Champion, places: Places, used: set[Node]) -> None:
-    """Draw light ones first, so that the heavy ones stay visible among hundreds."""
+    """Draw weak connections first, so that strong ones stay visible among hundreds."""
     edges, limit = graph.strongest_edges(champion), _thick_from(champion) or 1.0
     thickest, contrast = (2.2, 1.5) if len(edges) > _MANY_EDGES else (2.8, 1.0)
     lines, widths, colours = [], [], []
@@ -225,7 +225,7 @@ def _name_outputs(axes: Axes, champion: Champion, m: int, places: Places) -> Non
 
 
 def _name_inputs(axes: Axes, champion: Champion, m: int, places: Places) -> None:
-    """Write under each input what it reads, or where that does not fit how many inputs there are of each kind."""
+    """Write under each input what it reads or, where that does not fit, how many inputs of each kind there are."""
     pins = champion.plan.modules[m].pins
     x = [places[m, -1 - k][0] for k in range(len(pins))]
     by_kind = layout.are_by_kind(champion, m)

@@ -29,22 +29,22 @@ POINTS = 72.0  # per inch
 LAYER, INPUT, ACTUATOR, CLEAR = 0.55, 0.09, 0.5, 0.08
 
 MOST_NAMED = 60
-"""Inputs of a module beyond these have names by kind."""
+"""With more inputs than this, a module's inputs are named by kind."""
 _SHIFTS = (0.0, 0.15, -0.15, 0.3, -0.3)
-"""By how much of the distance between its nodes a layer may move aside; the first is best among equals."""
+"""Shares of the distance between its nodes by which a layer may move aside; among equals, the first is used."""
 _SAME_ROW = 0.1
 """Modules whose distance is below this share of the body's length stand in one row."""
 
 
 def are_by_kind(champion: Champion, m: int) -> bool:
-    """Whether the inputs of module `m` are too many to be named each."""
+    """Whether module `m` has too many inputs to name each of them."""
     return len(champion.plan.modules[m].pins) > MOST_NAMED
 
 
 def input_groups(champion: Champion, m: int) -> list[list[int]]:
     """The inputs of module `m` from left to right; those that read one kind of thing make a group.
 
-    In their order, or where they are too many to be named each, sensors of one quantity side by side.
+    In their order or, if there are too many to name each, with sensors of one quantity side by side.
     """
     plan, pins = champion.plan, champion.plan.modules[m].pins
     if not are_by_kind(champion, m):
@@ -200,14 +200,14 @@ def _spread(box: Bbox, count: int) -> list[float]:
 
 
 def _centre(node: Node, edges: Iterable[Edge], places: Places) -> float:
-    """The mean place of what a node reads, weighted: nodes in this order have fewer lines cross."""
+    """The mean place of what a node reads, weighted: in this order, fewer lines cross."""
     read = [(places[source][0], abs(weight)) for source, target, weight in edges if target == node and source in places]
     total = sum(weight for _, weight in read)
     return sum(x * weight for x, weight in read) / total if total > 0 else np.inf
 
 
 def _sidestepped(layer: Sequence[Node], edges: Iterable[Edge], places: Places, step: float) -> Places:
-    """The layer, moved aside if connections that skip it would seem to end at its nodes."""
+    """The places of a layer, moved aside if connections that skip it would seem to end at its nodes."""
     y = places[layer[0]][1]
     crossings = []
     for source, target, _ in edges:

@@ -34,7 +34,7 @@ def draw_figure(
     `studies` are by the name of their experiment; training curves run over `axis`, one of `AXES`.
 
     Raises:
-        MissingRunsError: it needs runs that are not there.
+        MissingRunsError: runs that it needs are missing.
         ExneatError: a panel names something that its experiment lacks, or a file cannot be read or written.
     """
     check_choice("axis", axis, AXES)
@@ -50,7 +50,7 @@ def draw_figure(
         figure, sentences = _draw_panels(plan, studies, axis, paper)
     paths = save_figure(figure, directory / plan.name, paper, ("png", "svg", "pdf"))
     text = " ".join(filter(None, [f"{plan.title}.", *sentences]))
-    # Where a style sheet cuts the margins off, places on the picture are no longer known.
+    # If a style sheet crops the margins, places on the picture are unknown.
     strips = () if paper.sheet.get("savefig.bbox") else value_strips(figure, OF_VARIANT)
     return Built(plan.name, plan.title, text, tuple(paths), strips=strips)
 
@@ -71,7 +71,7 @@ def _check_panel(plan: FigurePlan, panel: Panel, studies: Mapping[str, Study]) -
 
 
 def _draw_champions(plan: FigurePlan, studies: Mapping[str, Study], paper: Paper) -> tuple[Figure, list[str]]:
-    """Of each panel's variant the champion of the run that was best on validation, side by side."""
+    """For each panel's variant, the champion of the run that was best on validation, side by side."""
     champions, titles, sentences = [], [], []
     for panel in plan.panels:
         study, variant = studies[panel.experiment], str(panel.variant)
@@ -98,7 +98,7 @@ def _draw_panels(plan: FigurePlan, studies: Mapping[str, Study], axis: str, pape
             axes.set_title(study.conditions[panel.condition])
         for axes in places[len(plan.panels) :]:
             axes.remove()
-        if paper.columns is None:  # a paper has it in its caption
+        if paper.columns is None:  # in a paper, it is in the caption
             figure.suptitle(plan.title)
         lines = _add_legend(figure, width)
         if paper.columns:
@@ -122,7 +122,7 @@ def _add_legend(figure: Figure, width: float) -> int:
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label).removeprefix(OF_VARIANT), handle)
-    letter = rcParams["font.size"] / 133  # inches, roughly
+    letter = rcParams["font.size"] / 133  # inches, approximately
     inches = 8 * letter + letter * max(len(label) for label in entries)  # an entry's: its key and its letters
     columns = max(1, min(len(entries), int(width / inches)))
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
@@ -144,8 +144,8 @@ def _sentences(
         spent.append(study.spent_in(panel.condition, learning))
     yield _WHAT_IS_SHOWN[plan.kind]
     if plan.kind in ("training", "training_runs") and axis != "generation":
-        yield "Between generations a run counts with its latest value."
-        yield "A mean ends where the first of its runs does."
+        yield "Between generations, a run keeps its latest value."
+        yield "A mean ends where its first run ends."
     if plan.kind == "robustness" and max(trained) > BEST:
         yield f"Dashed lines: mean of the {BEST} runs of a variant that were best on validation."
     if plan.kind in ("training", "robustness"):

@@ -28,10 +28,10 @@ _AXIS_LABELS = {
 AXES = tuple(_AXIS_LABELS)
 """What the horizontal axis of a training curve can be."""
 MOST_POINTS = 100
-"""Points of a curve beyond these could not be told apart, but each would cost a bootstrap."""
+"""At most this many points of a curve: more could not be told apart, but each costs a bootstrap."""
 MARKERS_PER_CURVE = 8
 OF_VARIANT = "\u200b"
-"""Begins the label of what stands for a variant, unseen: matplotlib leaves out labels that begin with an underscore."""
+"""Marks, unseen, the beginning of a variant's label; matplotlib leaves out labels that begin with an underscore."""
 _DASHED: Look = {"linestyle": "--", "linewidth": 1.2}
 _BAR: Look = {"color": GREY, "linewidth": 2.4}
 
@@ -41,7 +41,7 @@ def draw_panel(kind: str, axes: Axes, panel: Panel, study: Study, looks: Looks, 
 
     Kinds are ``training`` (means of runs with 95% bands), ``training_runs`` (each run thin, means thick), ``area`` (one
     point per run, its mean over generations), ``robustness`` (means of runs with 95% bands; where a variant has more
-    than `BEST` runs, dashed the mean of those best on validation) and ``cluster`` (one point per run at each level).
+    than `BEST` runs, also the mean of those best on validation, dashed) and ``cluster`` (one point per run and level).
     Training curves run over `axis`, one of `AXES`. `looks` are those of all variants.
 
     Raises:
@@ -68,10 +68,10 @@ def _tables(rows: pd.DataFrame, variants: Iterable[str], place: str, score: str)
 
 
 def common_curves(curves: pd.DataFrame) -> pd.DataFrame:
-    """Bring the runs of one variant to common places on an axis: all that every run has reached and none has passed.
+    """Bring the runs of one variant to common places on an axis, up to where the first run ends.
 
     Runs spend different numbers of control steps per generation. Between two generations a run keeps the value of the
-    earlier one, which is what it had then. At most `MOST_POINTS` places are left.
+    earlier one, which is what it had then. At most `MOST_POINTS` places are kept.
     """
     shortest = min(curves[seed].dropna().index.max() for seed in curves)
     common: pd.DataFrame = curves.ffill().dropna()
@@ -137,12 +137,12 @@ def _draw_levels(axes: Axes, panel: Panel, study: Study, tables: Tables, looks: 
 
 
 def _mark_training(axes: Axes, panel: Panel, study: Study, levels: Sequence[float] = ()) -> None:
-    """Draw a line at the level at which runs were trained; `levels` that stand side by side have places from 0 on."""
+    """Draw a line at the level at which runs were trained; `levels`, if drawn side by side, have places from 0 on."""
     trained = study.trained.get(panel.condition, {}).get(str(panel.sweep))
     if trained is None:
         return
     place = np.interp(trained, levels, range(len(levels)), np.nan, np.nan) if levels else trained
-    if np.isfinite(place):  # else beside all levels that were tested
+    if np.isfinite(place):  # else outside of the levels that were tested
         axes.axvline(float(place), **AS_TRAINED)
 
 

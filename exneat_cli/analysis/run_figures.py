@@ -16,7 +16,7 @@ from exneat_cli.analysis.study import read_csv
 from exneat_cli.records import HISTORY_COLUMNS, UNPERTURBED, RobustnessRow, RunDirectory, read_robustness
 
 MOST_PREY = 50
-"""Paths of prey beyond these are left out of a picture: nobody could tell them apart."""
+"""At most this many prey have their paths drawn: more could not be told apart."""
 MOST_COLUMNS = 3
 _CURVES: dict[str, styles.Look] = {
     "best_so_far": {"label": "best so far", "color": "#222222", "linewidth": 1.2, "linestyle": "--"},
@@ -24,7 +24,7 @@ _CURVES: dict[str, styles.Look] = {
     "mean_fitness": {"label": "mean", "color": styles.VERMILION, "linewidth": 1.8, "linestyle": "-."},
     "median_fitness": {"label": "median", "color": styles.GREEN, "linewidth": 1.2, "linestyle": styles.DASH_DOT_DOT},
     "judged_fitness": {
-        "label": "best by all of its episodes",
+        "label": "best mean over all episodes",
         "color": styles.PURPLE,
         "linewidth": 1.8,
         "linestyle": (0.0, (8.0, 2.0)),
@@ -59,9 +59,9 @@ def draw_robustness(
 ) -> list[Path]:
     """Draw fitness at each level of each sweep in a run's robustness.csv, as PNG and SVG; no files without a sweep.
 
-    Of a level that was tested more than once, the row with the most episodes is shown. `labels` are those of the axes
-    by the sweeps' names, which stand in where there is none; `fitness_name` is that of the vertical axes, and
-    `trained` holds the level of training by the sweeps' names.
+    If a level was tested more than once, the row with the most episodes is shown. `labels` are those of the horizontal
+    axes by sweep, for which a sweep's name stands in; `fitness_name` is that of the vertical axes, and `trained` holds
+    the level of training by sweep.
     """
     tested = [row for row in read_robustness(run.robustness) if row.parameter != UNPERTURBED]
     rows = pd.DataFrame(tested, columns=RobustnessRow._fields).sort_values(["parameter", "level", "episodes"])
@@ -94,7 +94,7 @@ def draw_path(run: RunDirectory) -> list[Path]:
     """Draw the agent at work in the first test episode, as PNG and SVG.
 
     In a grid world: its path over the tiles and their cues, and the paths of prey. On the ground: its path,
-    coloured by time. Where a task tells no place: its reward terms over time.
+    coloured by time. For other tasks: their reward terms over time.
     """
     trace = read_csv(run.trace)
     title = f"{styles.run_title(run)}: first test episode"

@@ -18,7 +18,7 @@ Values = Sequence[float] | NDArray[np.float64]
 CONFIDENCE = 0.95
 RESAMPLES = 9999
 EXACT_BELOW = 21
-"""Samples without ties are compared by all their orders when both are smaller than this."""
+"""Samples without ties are compared exactly, over all their orders, if both are smaller than this."""
 
 
 def mean(values: Values) -> float:
@@ -29,7 +29,7 @@ def mean(values: Values) -> float:
 def interquartile_mean(values: Values) -> float:
     """Take the mean without the lowest and the highest quarter of runs, each rounded down; NaN without any.
 
-    One run that went astray does not move it (Agarwal et al., Deep reinforcement learning at the edge of the
+    A single outlier does not move it (Agarwal et al., Deep reinforcement learning at the edge of the
     statistical precipice, 2021).
     """
     return float(stats.trim_mean(values, 0.25)) if len(values) else math.nan
@@ -79,7 +79,7 @@ def mann_whitney_p(one: Values, other: Values) -> float:
 
 
 def holm(p_values: pd.Series) -> pd.Series:
-    """Correct each p for how many there are (Holm, A simple sequentially rejective test procedure, 1979).
+    """Correct each p for the number of them (Holm, A simple sequentially rejective test procedure, 1979).
 
     NaN stays NaN and does not count.
     """
@@ -109,7 +109,7 @@ def efficiency(curve: Values, target: float) -> int | None:
 
 
 def least_p(one: int, other: int) -> float:
-    """The smallest two-sided p that so many runs a side can reach: every run of one side beats all of the other."""
+    """The smallest two-sided p possible with so many runs a side: every run of one side beats all of the other."""
     return min(1.0, 2.0 / math.comb(one + other, one))
 
 
@@ -118,14 +118,14 @@ def compare(
 ) -> pd.DataFrame:
     """Summarise variants, each with one value per run or none, and compare each with its reference.
 
-    `references` names those of variants that are not compared with the first one; what others are compared with is not
-    compared itself. Those in `untrained` have no p: they are no competitors, so they must not cost the others power.
+    `references` names the reference of each variant that is not compared with the first one; references themselves are
+    not compared. Variants in `untrained` have no p: they do not compete, so they must not cost the other tests power.
 
     Returns:
         One row per variant, NaN for what does not exist. Columns: runs (how many values), mean, low and high (ends of
-        the mean's 95% interval), iqm (interquartile mean), margin (mean less that of the reference), p_holm
-        (`mann_whitney_p` against the reference, corrected by `holm`), a12 (chance that a run of this variant beats one
-        of the reference).
+        the mean's 95% interval), iqm (interquartile mean), margin (mean minus that of the reference), p_holm
+        (`mann_whitney_p` against the reference, corrected by `holm`), a12 (probability that a run of this variant beats
+        one of the reference).
     """
     first, references = next(iter(values), ""), references or {}
     rows = []

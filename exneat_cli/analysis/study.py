@@ -1,7 +1,7 @@
-"""What a report is made from: the planned runs of experiments, what their files hold, and what their training spent.
+"""What a report is made from: the planned runs of experiments, what their files hold, and what their training cost.
 
-A study is one experiment at one budget. Its runs are found by the directories that its settings lead to, or, where they
-are not there, among the published rows of the same settings' hash; so runs with other settings never slip in.
+A study is one experiment at one budget. Its runs are found in the directories that its settings lead to or, if they are
+not there, among the published rows with the same hash of settings; so runs with other settings are never included.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SPENT = ("episodes", "env_steps", "wall_seconds")
 
 
 class MissingRunsError(ExneatError):
-    """What is asked for needs runs that are not there; says which, and the command that makes them."""
+    """Runs that a figure or table needs are missing; says which, and the command that makes them."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class PlannedRun:
     Attributes:
         condition, variant, seed: its place in the experiment.
         directory: where its files are, or will be.
-        generations: how long it is trained; None takes any length.
-        configuration_hash: that of its settings, by which a published row is known.
+        generations: how long it is trained; None accepts any length.
+        configuration_hash: that of its settings, by which its published row is recognised.
     """
 
     condition: str
@@ -55,18 +55,18 @@ class Study:
     Attributes:
         experiment: its name.
         budget: ``paper``, ``quick`` or ``smoke``.
-        claim: what it is to show, in one sentence.
-        command: the command line that makes what is missing.
+        claim: what it is meant to show, in one sentence.
+        command: the command line that makes its missing runs.
         fitness_name: what the task's fitness is, in words.
         has_full_reward: whether the task has a second score.
         variants: name -> label, in the order of legends; the first is what others are compared with.
-        baselines: names of those variants that nothing trains.
+        baselines: names of the variants that are not trained.
         conditions: name -> label.
         sweeps: name of a robustness sweep -> label of its axis, with unit.
         runs: all of them.
         references: variant -> the one that it is compared with, for those that are not compared with the first.
-        levels: sweep -> the planned levels; None takes whatever levels there are.
-        sweep_episodes: the planned test episodes per level; None takes any number.
+        levels: sweep -> the planned levels; None accepts all levels.
+        sweep_episodes: the planned test episodes per level; None accepts any number.
         rows: published runs of the experiment, of any budget and settings.
         trained: condition -> sweep -> the level at which all of its runs were trained, where there is one.
     """
@@ -100,11 +100,11 @@ class Study:
 
     @property
     def trained_variants(self) -> tuple[str, ...]:
-        """Names of the variants that learn."""
+        """Names of the variants that are trained."""
         return tuple(name for name in self.variants if name not in self.baselines)
 
     def only(self, trained: Collection[str]) -> Study:
-        """The same study with these trained variants alone, and its baselines."""
+        """The same study with only these trained variants, and its baselines."""
         kept = {name: label for name, label in self.variants.items() if name in trained or name in self.baselines}
         references = {name: other for name, other in self.references.items() if {name, other} <= set(kept)}
         runs = tuple(run for run in self.runs if run.variant in kept)
@@ -118,7 +118,7 @@ class Study:
 
     @functools.cached_property
     def published(self) -> Mapping[PlannedRun, PublishedRun]:
-        """The runs that are not there, but whose published row is of the same settings."""
+        """The runs that are not finished here, but have a published row with the same settings."""
         rows = {row.place: row for row in self.rows}
         known = {run: rows.get((run.condition, run.variant, run.seed, self.budget)) for run in self.runs}
         return {
@@ -157,11 +157,11 @@ class Study:
 
     @functools.cached_property
     def results(self) -> pd.DataFrame:
-        """One row per finished or published run: what it reached, and what its training spent.
+        """One row per finished or published run: what it reached, and what its training cost.
 
         Columns: condition, variant, seed; training (final best so far), validation, test and full_reward (the
         champion's means over episodes); episodes, env_steps and wall_seconds of training. NaN for what a run lacks:
-        baselines have test figures alone.
+        baselines have only test figures.
         """
         rows: list[tuple[Any, ...]] = []
         for run in self.reached:
@@ -186,18 +186,18 @@ class Study:
         return here.assign(variant=here["variant"].map(self.variants))[["variant", "episodes", "env_steps"]].dropna()
 
     def best_first(self, condition: str, variant: str) -> list[PlannedRun]:
-        """Finished runs from the best on validation down; equal ones by seed, those without such a figure last."""
+        """Finished runs, the best on validation first; equal ones by seed, those without such a figure last."""
         validation = dict(zip(self.reached, self.results["validation"].fillna(-math.inf), strict=True))
         return sorted(self.of(condition, variant), key=validation.__getitem__, reverse=True)
 
     def best_seeds(self, condition: str, variant: str, among: Collection[Any]) -> list[int]:
-        """Seeds of the `BEST` runs that are best on validation, or of fewer, of those whose seeds are in `among`."""
+        """Seeds of the `BEST` runs (or fewer) that are best on validation, of those whose seeds are in `among`."""
         return [run.seed for run in self.best_first(condition, variant) if run.seed in among][:BEST]
 
     def history(self, condition: str) -> pd.DataFrame:
-        """history.csv of all runs that learned, one under another, with columns ``variant`` and ``seed``.
+        """history.csv of all trained runs in one table, with columns ``variant`` and ``seed``.
 
-        Published runs have nothing but ``generation`` and ``best_so_far``.
+        Published runs have only ``generation`` and ``best_so_far``.
         """
         tables = [
             pd.DataFrame({"generation": range(1, row.generations + 1), "best_so_far": row.best_so_far}).assign(
@@ -217,8 +217,8 @@ class Study:
     def robustness(self, condition: str) -> pd.DataFrame:
         """The planned rows of robustness.csv of all runs, with columns ``variant`` and ``seed``.
 
-        Published runs have no standard deviations. Rows that somebody tested besides, at other levels or with other
-        numbers of episodes, are left out.
+        Published runs have no standard deviations. Rows of tests at other levels or with other numbers of
+        episodes are left out.
         """
         nan = math.nan
         rows: list[tuple[Any, ...]] = [
@@ -269,7 +269,7 @@ def budget_sentence(places: Sequence[pd.DataFrame]) -> str:
     """Say whether variants had equal budgets, and how many environment steps each took.
 
     Variants are compared within each of `places`, tables of `Study.spent_in`. Episodes are what a budget sets; steps
-    follow from how long a variant's episodes last, so variants with equal budgets differ in them.
+    follow from how long a variant's episodes last, so variants with equal budgets may differ in them.
     """
     spent = pd.concat(places) if places else pd.DataFrame()
     if spent.empty:

@@ -24,19 +24,19 @@ from exneat_cli.records import RunDirectory, make_directory, write_whole
 Look = dict[str, Any]
 """Matplotlib's keywords for the line of a variant's mean: ``color``, ``marker``, ``linestyle`` and others."""
 
-# Okabe and Ito, "Color universal design" (2008); their yellow is darkened, or lines of it vanish on white,
-# and so far that those who see no red or no green do not take it for vermilion.
+# Okabe and Ito, "Color universal design" (2008); their yellow is darkened, since lines in it vanish on white,
+# and so much that readers who see no red or no green do not take it for vermilion.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#e69f00", "#56b4e9", "#009e73"
 BLUE, VERMILION, PURPLE, OLIVE = "#0072b2", "#d55e00", "#cc79a7", "#5c5800"
-GREY = "#444444"  # of what belongs to no variant or module
+GREY = "#444444"  # for what belongs to no variant or module
 AS_TRAINED: Look = {"color": GREY, "linestyle": ":", "linewidth": 1.2, "zorder": 1, "label": "as in training"}
 """The line at the level of a sweep at which runs were trained."""
 
 _STYLE: dict[str, Any] = {
     "svg.hashsalt": "exneat",
-    "svg.fonttype": "none",  # text stays text, which readers search and editors change
+    "svg.fonttype": "none",  # text stays text, which can be searched and edited
     "pdf.fonttype": 42,  # TrueType; publishers refuse the outlines that are the default
-    "text.parse_math": False,  # labels of users are text, dollars and backslashes too
+    "text.parse_math": False,  # users' labels are plain text, with any dollars and backslashes
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -99,7 +99,7 @@ def variant_styles(
 
     Variants of the thesis have a look of their own. Others take, in their order, the first colour that no
     variant of the same experiment has yet, and start over when all are taken. Colours, markers and dashes of a `cycle`
-    (matplotlib's ``axes.prop_cycle``) are taken in the order of trained variants, and count more.
+    (matplotlib's ``axes.prop_cycle``) are given to the trained variants in order, and take precedence.
     """
     learning = [name for name in variants if name not in baselines]
     trained = _chosen(learning, _TRAINED, _MORE_TRAINED)
@@ -122,14 +122,14 @@ class Paper:
 
     Attributes:
         columns: 1 or 2; None is the screen, where figures are larger and have titles.
-        sheet: matplotlib's settings that count more than ours.
+        sheet: matplotlib's settings that take precedence over ours.
     """
 
     columns: int | None = None
     sheet: Mapping[str, Any] = field(default_factory=dict)
 
     def style(self) -> AbstractContextManager[None]:
-        """Context in which figures are made and saved; a matplotlibrc of the user's own does not count there."""
+        """Context in which figures are made and saved; the user's matplotlibrc has no effect there."""
         printed = _PRINTED if self.columns else {}
         settings: Any = {**_STYLE, **printed, **self.sheet}
         return matplotlib.style.context(settings, after_reset=True)
@@ -146,10 +146,10 @@ SCREEN = Paper()
 
 
 def read_style_sheet(path: Path) -> dict[str, Any]:
-    """Read a style sheet of matplotlib's (``.mplstyle``), a line ``key: value`` for each setting.
+    """Read a matplotlib style sheet (``.mplstyle``), a line ``key: value`` for each setting.
 
     Raises:
-        ExneatError: it is no such file, or has a key or value that matplotlib does not know.
+        ExneatError: it is not such a file, or has a key or value that matplotlib does not know.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -161,15 +161,15 @@ def read_style_sheet(path: Path) -> dict[str, Any]:
         settings: Any = matplotlib.rc_params_from_file(path, fail_on_error=True, use_default_template=False)
         return dict(settings)
     except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no UTF-8 text"
+        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise ExneatError(f"style={path}: the style sheet cannot be read: {why}") from error
     except ValueError as error:
         why = str(error).splitlines()[0]
-        raise ExneatError(f"style={path}: a value that matplotlib does not take: {why}") from error
+        raise ExneatError(f"style={path}: matplotlib does not accept a value: {why}") from error
 
 
 def run_title(run: RunDirectory) -> str:
-    """Say what a run is, e.g. ``hunting, exneat-all-none, seed 3``: the hash in its name tells nobody anything."""
+    """Say what a run is, e.g. ``hunting, exneat-all-none, seed 3``, without the hash in its name."""
     name, _, digest = run.path.name.rpartition("-")
     variant, _, seed = name.rpartition("-s")
     is_usual = bool(variant) and seed.isdigit() and len(digest) == 6
@@ -177,16 +177,16 @@ def run_title(run: RunDirectory) -> str:
 
 
 def tick_levels(axes: Axes, levels: Iterable[float]) -> None:
-    """Keep the ticks of a horizontal axis whole where all levels are, such as numbers of tiles."""
+    """Use only whole numbers as ticks of a horizontal axis if all levels are whole, such as numbers of tiles."""
     if all(float(level).is_integer() for level in levels):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def save_figure(figure: Figure, path: Path, paper: Paper = SCREEN, kinds: Sequence[str] = ("png", "svg")) -> list[Path]:
-    """Write ``path.<kind>`` for all `kinds`, also where the name has dots of its own; returns all paths.
+    """Write ``path.<kind>`` for all `kinds`, even if the name contains dots; returns all paths.
 
     Raises:
-        ExneatError: they cannot be drawn with the settings of the paper, or not be written.
+        ExneatError: they cannot be drawn with the settings of the paper, or cannot be written.
     """
     make_directory(path.parent)
     written = []
@@ -199,7 +199,7 @@ def save_figure(figure: Figure, path: Path, paper: Paper = SCREEN, kinds: Sequen
                 if not paper.sheet:
                     raise
                 why = (str(error).strip() or type(error).__name__).splitlines()[0]
-                raise ExneatError(f"{path}.{kind}: cannot be drawn with that style=: {why}") from error
+                raise ExneatError(f"{path}.{kind}: cannot be drawn with this style=: {why}") from error
         written.append(path.with_name(f"{path.name}.{kind}"))
         write_whole(written[-1], buffer.getvalue())
     return written

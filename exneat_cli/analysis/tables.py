@@ -1,7 +1,7 @@
 """Tables as CSV, Markdown and LaTeX: those of the catalogue, and one comparison per experiment.
 
-Both show lines of a summary, one per condition, variant and quantity: a table of the catalogue one under another,
-beside what was published; a comparison with the quantities side by side.
+Both show lines of a summary, one per condition, variant and quantity: a table of the catalogue shows them one under
+another, beside what was published; a comparison shows the quantities side by side.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _KEY = ["experiment", "condition", "variant", "quantity"]
 _SUMMARY = [*_KEY, "runs", *STATISTICS, "p_holm", "a12", "efficiency"]
 _TESTED = ["runs", "margin", "p_holm", "a12"]
 LARGE = 10.0
-"""Where values reach this, one decimal says enough; a share between 0 and 1 needs three."""
+"""Where values reach this, one decimal is enough; shares between 0 and 1 need three."""
 _PLACE = ["condition", "variant", "quantity", "published"]
 
 
@@ -155,7 +155,7 @@ def _printed(lines: pd.DataFrame) -> pd.DataFrame:
 
 
 def rounded(value: float, decimals: int) -> str:
-    """Print a number for people; nothing for NaN."""
+    """Write a number for people; nothing for NaN."""
     # Adding zero turns a rounded -0.0 into 0.0.
     return "" if math.isnan(value) else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
@@ -178,7 +178,7 @@ def _write(directory: Path, words: Built, exact: pd.DataFrame, cells: pd.DataFra
 def _summary(study: Study, condition: str, columns: Mapping[str, Column]) -> pd.DataFrame:
     """One row per quantity and variant of the study, which are compared within the condition.
 
-    Columns: `_SUMMARY`; best_5 is the mean over the `BEST` runs best on validation, of robustness alone. Rows of
+    Columns: `_SUMMARY`; best_5 is the mean over the `BEST` runs best on validation, for robustness only. Rows of
     efficiency, which is a text, count all finished runs and have no statistics.
     """
     parts = []

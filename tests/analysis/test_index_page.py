@@ -111,9 +111,9 @@ def test_the_page_says_what_was_run(tmp_path: Path) -> None:
         run_of(study, "calm", "neat", seed).directory.update_manifest(finished=finished)
     words = Page(write_index(tmp_path / "report", {"track": study}, [], {})).words
     assert "track: exneat report" in words
-    assert "Of runs up to 2026-03-04 05:06 UTC." in words
+    assert "Includes runs that finished by 2026-03-04 05:06 UTC." in words
     assert "Small networks learn faster." in words
-    assert "Budget quick: 2 of 14 runs finished, 1,234,567 environment steps of training, which took 0:03:01" in words
+    assert "2 of 14 runs are finished; their training took 1,234,567 environment steps and 0:03:01 (h:mm:ss)" in words
     assert "No two variants have finished runs" in words
     assert "exneat 0.1.0 and 0.2.0, numpy 2.4.6." in words
     assert "NEAT260 to 2" in words

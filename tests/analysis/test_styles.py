@@ -117,8 +117,8 @@ def test_a_backend_that_is_not_there_is_done_without_and_settings_that_cannot_be
     ("content", "message"),
     [
         (b"font.siz: 7", "font.siz: matplotlib has no such setting\n  did you mean font.size?"),
-        (b"font.size: large\nlines.linewidth: thick", "a value that matplotlib does not take"),
-        (b"\xff\xfe", "it is no UTF-8 text"),
+        (b"font.size: large\nlines.linewidth: thick", "matplotlib does not accept a value"),
+        (b"\xff\xfe", "it is not UTF-8 text"),
         (None, "No such file or directory"),
     ],
 )
@@ -138,5 +138,5 @@ def test_a_style_that_cannot_be_drawn_here_is_named(tmp_path: Path) -> None:
     paper, figure = Paper(sheet={"text.usetex": True, "text.latex.preamble": r"\nonsense"}), Figure()
     with paper.style():
         figure.suptitle("text")
-    with pytest.raises(ExneatError, match="cannot be drawn with that style="):
+    with pytest.raises(ExneatError, match="cannot be drawn with this style="):
         save_figure(figure, tmp_path / "figure", paper)

@@ -1,5 +1,5 @@
-// Tables that are sorted by a click on a column's heading, and rows of variants that can be left out. Without scripts, and on
-// paper, they are whole and in the order of the report.
+// Sorts a table by a click on a column's heading, and hides the rows of variants. Without scripts, and on paper, tables are
+// complete and in the order of the report.
 "use strict";
 
 const valueOf = (row, column) => row.cells[column].textContent.trim();
