@@ -168,7 +168,7 @@ def read_command_line(command: str, arguments: Sequence[str]) -> CommandLine:
         hint = nearest(unknown[0], _FLAGS) or f"settings are written key=value, see exneat {command} --help"
         raise ExneatError(f"{unknown[0]}: unknown flag; {hint}")
     if flags.multirun and command != "train":
-        raise ExneatError(f"-m: only exneat train runs several values, exneat {command} does not")
+        raise ExneatError(f"-m: only exneat train accepts several values, exneat {command} does not")
     shipped = shipped_directory("conf")
     for own in flags.config_dir:
         for path in own.rglob("*.yaml"):

@@ -89,7 +89,7 @@ def run(line: CommandLine) -> int:
 def _checks(output: Path) -> list[tuple[str, Callable[[], str], str, str]]:
     """For each check: name, function that says what it found, state if that raises, and remedy."""
     install = "reinstall exneat in an environment of its own, or only what is named here"
-    place = "set output= to a directory on a disk that is writable and supports file locks"
+    place = "set output= to a writable directory on a disk that supports file locks"
     egl = "apt-get install libegl1 libopengl0 libgl1-mesa-dri, and set MUJOCO_GL=egl; training needs no rendering"
     return [
         ("python", _versions, DEGRADED, install),

@@ -84,7 +84,7 @@ def _rows(settings: Mapping[str, Any], comments: Mapping[str, str], prefix: str 
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Key and comment side by side; long comments are wrapped, and begin on the next line beside a long key."""
+    """Key and comment side by side; long comments are wrapped, and begin below a key that leaves no room."""
     width = max(80, min(120, shutil.get_terminal_size().columns))
     for key, comment in rows:
         lines = textwrap.wrap(comment, width - _COLUMN - 2) or [""]

@@ -190,7 +190,7 @@ def _trained_levels(jobs: Sequence[Job], condition: str) -> dict[str, float]:
 def _nothing_to_report(
     asked: Mapping[str, Any], sources: Mapping[str, Any], commands: Mapping[str, str]
 ) -> ExneatError:
-    """The error that nothing can be reported; it names what exists instead, and commands for it."""
+    """The error for when there is nothing to report; it names what exists instead, and commands for it."""
     found: dict[str, None] = {}
     alone = 0
     for run in find_runs(Path(asked["output"]), tell_unreadable):

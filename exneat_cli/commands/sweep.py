@@ -1,4 +1,4 @@
-"""`exneat sweep`: experiments: all variants, conditions and seeds that a YAML file describes."""
+"""`exneat sweep`: runs an experiment: all variants, conditions and seeds that a YAML file describes."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _settings(key: str, values: Any) -> dict[str, Any]:
 def plan_jobs(experiment: Experiment, budget: str, line: CommandLine, others: Sequence[str]) -> list[Job]:
     """Plan every run of an experiment: jobs called ``<condition>/<variant>/<seed>``, in this order.
 
-    The user's settings in `line` apply to all runs and take precedence; those named in `others` are not of runs.
+    The user's settings in `line` apply to all runs and take precedence; `others` are not settings of runs.
 
     Raises:
         ExneatError: settings make no sense, in at least one of the runs.

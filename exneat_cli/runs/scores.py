@@ -144,7 +144,7 @@ def robustness_row(settings: RunSettings, parameter: str, level: float, score: S
 
 
 def summary_sentence(task: Task, result: Result) -> str:
-    """What a run learned, in one sentence, from the `result` of its manifest; another sentence if it is plain Python.
+    """What a run learned, in one sentence, from the `result` of its manifest; a second one if it is in plain Python.
 
     It says "Learned" only if the champion clearly beats both baselines and, where a task is about moving forward, moves
     forward in most episodes. Clearly: in the same test episodes, the mean difference exceeds twice its standard error.

@@ -81,7 +81,15 @@ def test_the_page_needs_no_network_no_other_script_and_no_picture_beside_it_and_
 def test_chapters_come_in_order_with_tables_before_figures_and_the_contents_lead_to_each(tmp_path: Path) -> None:
     page = Page(a_report(tmp_path))
     chapters = ["chapter-4-figures", "figure-4.1", "chapter-5-tables-and-figures", "table-5.1", "figure-5.1"]
-    others = ["chapter-7-figures", "figure-7.1", "comparisons", "comparison-track", "others", "my-own", "missing"]
+    others = [
+        "chapter-7-figures",
+        "figure-7.1",
+        "comparisons",
+        "comparison-track",
+        "other-tables-and-figures",
+        "my-own",
+        "missing",
+    ]
     assert page.values["id"] == ["filter", "what-was-run", "run-track", *chapters, *others]
     assert [link[1:] for link in page.values["href"] if link.startswith("#")] == page.values["id"][1:]
 
