@@ -56,7 +56,7 @@ def tell(finished: Finished) -> None:
     """Print what one run wrote and learned."""
     directory = finished.directory
     if not finished.trained_now:
-        print(f"{directory.path} is already finished; nothing was trained.")
+        print(f"{directory.path} is finished already; nothing was trained.")
     print("\nWritten:")
     for path in sorted(path for path in directory.path.rglob("*") if path.is_file()):
         print(f"  {path}")

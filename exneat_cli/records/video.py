@@ -40,7 +40,7 @@ def _ffmpeg() -> str:
 
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError) as error:
-        raise ExneatError(f"expected imageio-ffmpeg's ffmpeg, got: {error}\n  pip install 'exneat[video]'") from error
+        raise ExneatError(f"expected ffmpeg (imageio-ffmpeg), got: {error}\n  pip install 'exneat[video]'") from error
 
 
 def write_video(path: Path, frames: Generator[NDArray[np.uint8]], fps: float, form: str) -> int:

@@ -99,7 +99,7 @@ def test_an_output_root_that_is_a_file_is_broken(ask: Ask, tmp_path: Path) -> No
     ("code", "words"),
     [
         ("raise SystemExit('no frame')", "no frame"),
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "ended by SIGSEGV"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "killed by SIGSEGV"),
         ("import time; time.sleep(60)", "no answer within 0.5 s"),
     ],
 )
