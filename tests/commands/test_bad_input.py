@@ -132,7 +132,7 @@ TRAIN = {
     "=3": "=3: expected key=value, got no key",
     "===": "===: expected key=value",
     "+": "+: expected key=value",
-    "hydra.run.dir=x": "hydra.run.dir=x: exneat sets hydra.run.dir itself\n  hydra/launcher=",
+    "hydra.run.dir=x": "hydra.run.dir=x: exneat sets hydra.run.dir itself\n  you may set hydra/launcher=",
     "hydra.output_subdir=x": "exneat sets hydra.output_subdir itself",
     "hydra.job.chdir=true": "exneat sets hydra.job.chdir itself",
     "hydra/job_logging=default": "exneat sets hydra.job_logging itself",

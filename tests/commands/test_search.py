@@ -57,7 +57,7 @@ def test_a_search_that_was_killed_ends_as_one_that_was_not_and_its_command_repea
     assert best == same
     assert main([*train[1:], f"output={tmp_path / 'again'}"]) == 0
     (run,) = find_runs(tmp_path / "again")
-    assert f"validation {run.read_result().validation:.6g}," in best
+    assert f"validation fitness {run.read_result().validation:.6g}," in best
     reached = [line.partition(":")[0].split()[-1] for line in whole.splitlines() if line.startswith("[")]
     equals = reached.count(f"{run.read_result().validation:.4g}")
     assert (f", the first of {equals} that reached it," in best) == (equals > 1)

@@ -139,7 +139,7 @@ def test_a_run_that_names_a_class_is_read_where_a_package_registers_it(tmp_path:
         ("task.kind=kinds:Kind", "a dataclass with a field `name` and none called `kind`"),
         ("task.kind=walks:Corridor task.size=3", "task.size: unknown key (value 3)"),
         ("task.kind=walks:Corridor task.length=2", "task.length: expected a whole number from 3 to 99, got 2"),
-        ("task.kind=kinds:Rash task.width=x", "task: expected parameters that Rash can take"),
+        ("task.kind=kinds:Rash task.width=x", "task: expected parameters that Rash accepts"),
         (
             "task.kind=walks:Corridor task.name=hunting",
             "task.kind: expected nothing, for task.name=hunting has a class",

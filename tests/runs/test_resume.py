@@ -157,7 +157,7 @@ def test_how_often_a_checkpoint_is_written_changes_nothing(tmp_path: Path, every
     train_stopping(settings, "write_history", 4)
     found, said = resumed(settings)
     assert found == undisturbed
-    assert [text for text in said if text.startswith("going on")] == (
+    assert [text for text in said if text.startswith("continuing")] == (
         [] if every == 100 else [f"continuing after generation {3 // every * every}"]
     )
 

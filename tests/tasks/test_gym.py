@@ -203,7 +203,7 @@ def test_the_order_of_parts_makes_another_run_and_that_of_arguments_does_not() -
         ({"part_entries": {"a": {"sensors": [4], "actuators": [0]}}}, "a.sensors: expected a whole number from 0 to 3"),
         (
             {"part_entries": {"a": {"sensors": [0, 0], "actuators": [0]}}},
-            "a.sensors: expected entries that no part has",
+            "a.sensors: expected entries that occur only once in all parts",
         ),
         (
             {"part_entries": {k: {"sensors": [n], "actuators": [1]} for n, k in enumerate("ab")}},

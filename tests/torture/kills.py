@@ -157,7 +157,7 @@ def _kill_at(moment: str, program: Program, output: Path, chance: random.Random)
 
 
 def _is_begun(program: Program) -> bool:
-    return ": generation" in program.errors or ": going on" in program.errors
+    return ": generation" in program.errors or ": continuing" in program.errors
 
 
 def _measure_repetition(errors: str, rows: int, every: int, tally: _Tally) -> None:
