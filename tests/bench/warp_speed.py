@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import mannwhitneyu
@@ -25,6 +26,9 @@ from exneat_cli.seeding import training_episodes
 from exneat_cli.tasks import RobotTask
 from exneat_cli.wiring import Geometry
 from tests.bench.measurement import MEGABYTES, RATIO, SECONDS, STEPS_A_SECOND, Bar, Row
+
+if TYPE_CHECKING:
+    from exneat_cli.rollouts.batch.stage import Stage
 
 SPEED_BAR, OVERHEAD_BAR, SECONDS_BAR = Bar(300_000.0, True), Bar(0.8, True), Bar(600.0, False)
 FIRST_SEED = 100
@@ -135,7 +139,7 @@ def compare_with_bare_steps(sizes: Sizes) -> Row:
     return Row("whole control steps over bare steps", RATIO, [bare_seconds / ours], OVERHEAD_BAR, note)
 
 
-def _do_steps(stage, steps: int) -> None:  # type: ignore[no-untyped-def]
+def _do_steps(stage: Stage, steps: int) -> None:
     stage.launch(steps)
     stage.look()
 
@@ -151,7 +155,7 @@ def _seconds_per_call(work: object, calls: int) -> float:
     return (time.perf_counter() - began) / calls
 
 
-def _filled_stage(sizes: Sizes, count: int):  # type: ignore[no-untyped-def]
+def _filled_stage(sizes: Sizes, count: int) -> tuple[Stage, Any]:
     """A stage of so many worlds with enough to do for all of them, and its worlds."""
     from exneat_cli.rollouts.batch.stage import Stage
 
@@ -161,8 +165,15 @@ def _filled_stage(sizes: Sizes, count: int):  # type: ignore[no-untyped-def]
     brains = assemble(settings.plan, [team.genomes for team in teams], feed_forward=settings.evolution.feed_forward)
     scale = settings.noise.reset_scale
     worlds = task.open_batch(count, sizes.executor.device_name, training=True, reset_scale=scale, room=1)
-    shape = {"sensed_size": task.sensed_size, "action_size": len(task.actuator_names), "terms": len(task.terms)}
-    stage = Stage(worlds, sensor_std=0.0, slots=1, **shape)
+    stage = Stage(
+        worlds,
+        sensor_std=0.0,
+        slots=1,
+        sensed_size=task.sensed_size,
+        action_size=len(task.actuator_names),
+        terms=len(task.terms),
+        moments=False,
+    )
     stage.put(0, brains, training_episodes(FIRST_SEED, 0, -(-6 * count // len(teams))))
     return stage, worlds
 

@@ -42,7 +42,10 @@ class Doing:
 
 @wp.struct
 class Outcome:
-    """For each slot and place, status and steps, (S, places), and totals, (S, places, 4); (S,) ended episodes."""
+    """For each slot and place, status and steps, (S, places), and totals, (S, places, 4).
+
+    `ended`, (S + 1,), counts all episodes of each slot that have ended, and lastly tells whether room was exceeded.
+    """
 
     status: wp.array2d(dtype=int)
     steps: wp.array2d(dtype=int)

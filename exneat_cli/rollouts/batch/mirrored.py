@@ -1,7 +1,8 @@
-"""Arrays that the host writes and a device reads."""
+"""Arrays that the host writes and a device reads, and the other way round."""
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,35 @@ class Mirrored:
     def resized(self, values: NDArray[Any]) -> Mirrored:
         """A new one of the same type, with other values."""
         return Mirrored(values, self.there.dtype)
+
+
+class Reported:
+    """An array on the current device whose values reach the host one report late, so that the device need not wait.
+
+    At most two reports may be on their way.
+    """
+
+    def __init__(self, there: Any) -> None:
+        self._there, self._waits = there, there.device.is_cuda
+        self._unused = [wp.empty(there.shape, there.dtype, device="cpu", pinned=self._waits) for _ in range(2)]
+        self._sent: deque[tuple[Any, Any]] = deque()
+
+    def send(self) -> None:
+        """Queue a copy behind the device's other work."""
+        copy = self._unused.pop()
+        wp.copy(copy, self._there)
+        self._sent.append((copy, wp.record_event() if self._waits else None))
+
+    def take(self) -> NDArray[Any] | None:
+        """The report before the last one, once it has come; None if there is none."""
+        if len(self._sent) < 2:
+            return None
+        copy, event = self._sent.popleft()
+        if event is not None:
+            wp.synchronize_event(event)
+        values: NDArray[Any] = copy.numpy().copy()
+        self._unused.append(copy)
+        return values
 
 
 def widened(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from exneat_cli.rollouts.batch.kernels import Doing
 from exneat_cli.rollouts.batch.mirrored import grown
@@ -76,7 +74,7 @@ class Sensing:
         slots, _, size = self._ended[0].shape
         self._ended = [grown(each, (slots, places, size)) for each in self._ended]
 
-    def of(self, slot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(places, sensed) means and sums of squared deviations of a slot."""
-        means, squares = (each[slot].numpy() for each in self._ended)
+    def of(self, slot: int) -> tuple[Any, Any]:
+        """(places, sensed) means and sums of squared deviations of a slot, on the device."""
+        means, squares = (each[slot] for each in self._ended)
         return means, squares

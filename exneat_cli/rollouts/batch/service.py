@@ -20,8 +20,8 @@ from exneat_cli.rollouts.settings import Executor, Noise
 from exneat_cli.seeding import EpisodeSeeds
 from exneat_cli.tasks import HasBatch, Task
 
-STEPS_AT_ONCE = 8
-"""Control steps between checks for ended episodes."""
+STEPS_AT_ONCE = 4
+"""Control steps between checks for ended episodes; as many more are queued by then."""
 GATHERING_SECONDS = 0.02
 """How long an idle batch waits for requests of other runs before it starts (s)."""
 MOST_SLOTS = 1024
@@ -155,7 +155,7 @@ class _Batch:
         if stage is None:
             return
         if self._running:
-            stage.launch(STEPS_AT_ONCE)  # meanwhile, the following lines prepare more work
+            stage.launch(STEPS_AT_ONCE)
         if len(waiting) <= self._slots - len(self._running):  # otherwise all wait until there are enough slots
             free = [slot for slot in range(self._slots) if slot not in self._running]
             for slot, request in zip(free, waiting, strict=False):
@@ -166,7 +166,7 @@ class _Batch:
             self._double_room()
             return
         for slot, request in list(self._running.items()):
-            if ended[slot] == request.jobs:
+            if ended[slot]:
                 stage.fetch(slot, request.tally)
                 del self._running[slot]
                 self.requests.remove(request)

@@ -1,7 +1,8 @@
 """One batch of worlds with its queue of jobs: each request takes a slot, and worlds that finish take the next job.
 
 A control step is one sequence of kernels, captured as a CUDA graph on a GPU: take jobs, reset, observe, disturb, sense,
-activate, drive, step, keep count. During episodes, the host only reads how many of them have ended.
+activate, drive, step, keep count. During episodes, the host only reads how many of them have ended, one launch late, so
+that the device has work while the host prepares more.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from exneat_cli.brains.batch import activate, packed
 from exneat_cli.brains.brain import memory_size
 from exneat_cli.rollouts.batch import kernels
 from exneat_cli.rollouts.batch.kernels import IDLE, Doing, Jobs, Outcome
-from exneat_cli.rollouts.batch.mirrored import Mirrored, grown, widened
+from exneat_cli.rollouts.batch.mirrored import Mirrored, Reported, grown, widened
 from exneat_cli.rollouts.batch.sensing import Sensing
 from exneat_cli.rollouts.episode import Tally
 from exneat_cli.seeding import EpisodeSeeds
@@ -55,7 +56,7 @@ class Stage:
             self._keys = Mirrored(np.zeros((slots, 2), np.uint32))
             self._starts = Mirrored(np.tile(worlds.resting_start(), (1 + slots, 1)))
             self._queue = Mirrored(np.zeros((1, 4), np.int32), wp.vec4i)
-            self._tail = Mirrored(np.zeros(1, np.int32))
+            self._tail = 0
             self._episodes = 1
             self._memory = wp.zeros((count, sensed_size + 1), dtype=float)
             framed = worlds.readings_size != sensed_size or worlds.is_framed
@@ -63,15 +64,18 @@ class Stage:
             self._action = wp.zeros((count, action_size), dtype=float)
             self._jobs = Jobs()
             self._jobs.head = wp.zeros(1, dtype=int)
-            self._jobs.tail, self._jobs.queue = self._tail.there, self._queue.there
+            self._jobs.tail, self._jobs.queue = wp.zeros(1, dtype=int), self._queue.there
             self._doing = _struct(Doing(), count, int, "slot", "brain", "episode", "place", "steps")
             self._doing.totals = wp.zeros((count, terms), dtype=wp.float64)
             self._doing.brain.fill_(-1)
             self._outcome = _struct(Outcome(), (slots, 1), int, "status", "steps")
             self._outcome.totals = wp.zeros((slots, 1, terms), dtype=wp.float64)
-            self._outcome.ended = wp.zeros(slots, dtype=int)
+            self._outcome.ended = wp.zeros(slots + 1, dtype=int)
             self._sensing = Sensing(count, slots, sensed_size) if moments else None
-            self._overflow = wp.zeros(1, dtype=int)
+            self._overflow = self._outcome.ended[slots:]
+            self._queued = np.zeros(slots, np.int64)
+            self._reported = Reported(self._outcome.ended)
+            self._aside = wp.Stream(self.device) if self.device.is_cuda else None
             worlds.status.fill_(IDLE)
             self._program()  # compiles and loads all kernels, which must not happen during a capture
 
@@ -87,13 +91,13 @@ class Stage:
             keys = [each.sensor_noise.generate_state(2, np.uint32) for each in episodes]
             self._keys.write(slot * self._episodes, np.array(keys, np.uint32))
             self._starts.write(1 + slot * self._episodes, self._worlds.starts(episodes))
-            self._outcome.ended[slot : slot + 1].zero_()
-            tail, room = int(self._tail.here[0]), len(self._queue.here)
+            tail, room = self._tail, len(self._queue.here)
             until_end = room - tail % room
             self._queue.write(tail % room, jobs[:until_end])
             if len(jobs) > until_end:
                 self._queue.write(0, jobs[until_end:])
-            self._tail.write(0, np.array([tail + len(jobs)]))
+            self._move_tail(tail + len(jobs))
+            self._queued[slot] += len(jobs)
 
     def launch(self, steps: int) -> None:
         """Queue some control steps on the device, without waiting for them."""
@@ -107,21 +111,37 @@ class Stage:
                     wp.capture_launch(self._graph)
                 else:
                     self._program()
+            self._reported.send()
 
-    def look(self) -> tuple[NDArray[np.int32], bool]:
-        """(S,) ended episodes of each slot once all launched steps are done, and whether room was exceeded."""
-        return self._outcome.ended.numpy(), bool(self._overflow.numpy()[0])
+    def look(self) -> tuple[NDArray[np.bool_], bool]:
+        """(S,) slots whose episodes have all ended, and whether room was exceeded, both before the last launch.
+
+        Waits for the launch before the last one; nothing has ended if there was none.
+        """
+        ended = self._reported.take()
+        if ended is None:
+            return np.zeros(self._slots, np.bool_), False
+        return ended[:-1] == self._queued, bool(ended[-1])
 
     def fetch(self, slot: int, tally: Tally) -> None:
         """Write the results of a slot whose episodes have all ended to `tally`."""
         statuses, steps, totals, *moments = tally
         jobs, shape = statuses.size, statuses.shape
-        statuses[:] = self._outcome.status[slot].numpy()[:jobs].reshape(shape)
-        steps[:] = self._outcome.steps[slot].numpy()[:jobs].reshape(shape)
-        totals[:] = self._outcome.totals[slot].numpy()[:jobs].reshape(*shape, -1)
+        statuses[:] = self._read(self._outcome.status[slot])[:jobs].reshape(shape)
+        steps[:] = self._read(self._outcome.steps[slot])[:jobs].reshape(shape)
+        totals[:] = self._read(self._outcome.totals[slot])[:jobs].reshape(*shape, -1)
         if self._sensing is not None:
-            for wanted, came in zip(moments, self._sensing.of(slot), strict=True):
-                wanted[:] = came[:jobs].reshape(*shape, -1)
+            for wanted, there in zip(moments, self._sensing.of(slot), strict=True):
+                wanted[:] = self._read(there)[:jobs].reshape(*shape, -1)
+
+    def _read(self, array: Any) -> NDArray[Any]:
+        """The entries of an array that no launched step will change, read without waiting for these steps."""
+        with wp.ScopedStream(self._aside, sync_enter=False):
+            copy = wp.clone(array, device="cpu")
+            if self._aside is not None:
+                wp.synchronize_stream(self._aside)
+        values: NDArray[Any] = copy.numpy()
+        return values
 
     def _program(self) -> None:
         worlds, doing, count = self._worlds, self._doing, self._worlds.count
@@ -149,7 +169,7 @@ class Stage:
 
     def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
         """Enlarge arrays that are too small, keeping their entries; the steps are then captured again."""
-        slots = self._slots
+        slots, graph = self._slots, self._graph
         if words > self._programs.here.shape[1]:
             self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
             self._graph = None
@@ -167,6 +187,8 @@ class Stage:
                 self._sensing.make_room(_ample(jobs))
             self._grow_queue(slots * _ample(jobs))
             self._graph = None
+        if graph is not self._graph:
+            wp.synchronize_device()  # before results are read from the new arrays, aside from the steps
 
     def _grow_episodes(self, episodes: int) -> None:
         before, slots = self._episodes, self._slots
@@ -181,12 +203,20 @@ class Stage:
 
     def _grow_queue(self, room: int) -> None:
         """Enlarge the queue, so that all slots can be full; waiting jobs move to the front."""
-        head, tail = int(self._jobs.head.numpy()[0]), int(self._tail.here[0])
-        waiting = self._queue.here[(head + np.arange(tail - head)) % len(self._queue.here)]
+        head = int(self._jobs.head.numpy()[0])
+        waiting = self._queue.here[(head + np.arange(self._tail - head)) % len(self._queue.here)]
         self._queue = self._queue.resized(widened(waiting, (room, 4)))
         self._jobs.queue = self._queue.there
         self._jobs.head.zero_()
-        self._tail.write(0, np.array([len(waiting)]))
+        self._move_tail(len(waiting))
+
+    def _move_tail(self, tail: int) -> None:
+        """Make known that jobs are queued up to `tail`.
+
+        The number travels with the command: memory of the host may change before a queued copy reads it.
+        """
+        self._tail = tail
+        self._jobs.tail.fill_(tail)
 
 
 def _struct(struct: Any, shape: Any, dtype: type, *names: str) -> Any:
