@@ -60,8 +60,7 @@ def test_bounds_themselves_are_accepted() -> None:
 @pytest.mark.parametrize("setting", ["MUJOCO_GL=nonsense", "MUJOCO_GL=osmesa", "NUMBA_DISABLE_JIT=1"])
 def test_an_environment_variable_that_does_not_fit_is_named_in_a_line(setting: str) -> None:
     name, _, value = setting.partition("=")
-    start = "from exneat_cli.main import program; raise SystemExit(program())"
-    command = [sys.executable, "-c", start, "watch", "run=nowhere"]
+    command = [sys.executable, "-m", "exneat_cli", "watch", "run=nowhere"]
     if value == "osmesa" and ctypes.util.find_library("OSMesa"):
         pytest.skip("OSMesa is here")
     environment = {**os.environ, name: value, "PYTHONPATH": str(Path(exneat_cli.__file__).parents[1])}

@@ -25,7 +25,8 @@ _PAGE = """<!DOCTYPE html>
 <link rel="icon" href="data:,">
 <title>exneat watch</title>
 <style>
-body { margin: 1em; font: 16px sans-serif; background: #fff; color: #222; }
+:root { color-scheme: light dark; }
+body { margin: 1em; font: 16px sans-serif; }
 #stage img { max-width: 100%; display: block; }
 #controls { display: flex; gap: 1em; align-items: center; margin-top: 0.5em; max-width: 80em; }
 #where { flex: 1; }

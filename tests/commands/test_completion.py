@@ -16,8 +16,6 @@ from exneat_cli.commands.command_line import read_command_line
 from exneat_cli.commands.completion import SHELLS
 from exneat_cli.main import COMMANDS, main
 
-PROGRAM = "import sys; from exneat_cli.main import program; sys.exit(program())"
-
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -74,7 +72,7 @@ def test_every_setting_that_a_command_composes_is_offered(command: str, capsys: 
 
 
 def test_an_answer_waits_for_no_large_library() -> None:
-    code = f"{PROGRAM.removesuffix('sys.exit(program())')}program(); print(*sys.modules)"
+    code = "import sys; from exneat_cli.main import program; program(); print(*sys.modules)"
     words = [sys.executable, "-c", code, "completion", "fish", "exneat", "train", "task="]
     answer = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert "task=ant" in answer
@@ -88,7 +86,7 @@ def test_a_real_bash_completes_what_is_typed(place: Path) -> None:
     (place / "rc").write_text(
         f"""PS1='ready '; export PYTHONPATH={os.pathsep.join(filter(None, sys.path))!r}
 exneat() {{
-    if [[ $1 == completion ]]; then {sys.executable} -c '{PROGRAM}' "$@"; else printf '<%s>' "$@"; echo done; fi
+    if [[ $1 == completion ]]; then {sys.executable} -m exneat_cli "$@"; else printf '<%s>' "$@"; echo done; fi
 }}
 eval "$(exneat completion bash)"
 """

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.torture.faulty_disk import Ended, Fault, run_exneat
 from tests.torture.findings import Finding, Mistakes, exactly, say
-from tests.torture.program import START, environment
+from tests.torture.program import environment
 from tests.torture.small_runs import difference, results, rows_of, status_of, the_run
 
 _SIDE_BY_SIDE = 2
@@ -130,7 +130,7 @@ exit $code
 def _fill_real_disk(size: int, folder: Path, expected: dict[str, bytes], mistakes: Mistakes) -> None:
     (folder / "out").mkdir(parents=True)
     (folder / "temporary").mkdir()
-    command = [sys.executable, "-c", START, *_RUN, "output=out"]
+    command = [sys.executable, "-m", "exneat_cli", *_RUN, "output=out"]
     done = subprocess.run(
         ["unshare", "-rm", "sh", "-c", _SCRIPT, "sh", str(size), *command],
         cwd=folder,

@@ -16,8 +16,6 @@ import exneat_cli
 
 HANGING = 180.0
 """Seconds after which a process that should end by itself is taken for stuck."""
-START = "import sys; from exneat_cli.main import program; sys.exit(program())"
-"""What an installed `exneat` does, for any interpreter."""
 _POLL = 0.002
 
 
@@ -35,7 +33,7 @@ class Program:
         self.temporary.mkdir(exist_ok=True)
         with self._out.open("wb") as out, self._err.open("wb") as err:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", START, *arguments],
+                [sys.executable, "-m", "exneat_cli", *arguments],
                 cwd=folder,
                 env=environment(self.temporary),
                 stdin=subprocess.DEVNULL,
