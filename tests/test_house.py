@@ -12,19 +12,7 @@ import pytest
 import exneat_cli
 
 PACKAGE = Path(exneat_cli.__file__).parent
-ROOMS = [
-    "tasks",
-    "wiring",
-    "algorithms",
-    "brains",
-    "rollouts",
-    "records",
-    "runs",
-    "analysis",
-    "commands",
-    "main",
-    "__main__",
-]
+ROOMS = "tasks wiring algorithms brains rollouts records runs analysis commands main __main__".split()
 FREE = {"compiling", "errors", "interruption", "output", "seeding"}
 FENCES = {
     "hydra": {"main", "commands"},
