@@ -77,5 +77,7 @@ def widened(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
 
 
 def grown(array: Any, shape: tuple[int, ...]) -> Any:
-    """A larger array on the current device, with the same entries, padded with zeros."""
-    return wp.array(widened(array.numpy(), shape), dtype=array.dtype)
+    """A larger array on the current device, with the same entries, padded with zeros; any stream may read it."""
+    larger = wp.array(widened(array.numpy(), shape), dtype=array.dtype)
+    wp.synchronize_device()
+    return larger

@@ -169,7 +169,7 @@ class Stage:
 
     def _make_room(self, words: int, memory: int, episodes: int, jobs: int) -> None:
         """Enlarge arrays that are too small, keeping their entries; the steps are then captured again."""
-        slots, graph = self._slots, self._graph
+        slots = self._slots
         if words > self._programs.here.shape[1]:
             self._programs = self._programs.resized(widened(self._programs.here, (slots, _ample(words))))
             self._graph = None
@@ -187,8 +187,6 @@ class Stage:
                 self._sensing.make_room(_ample(jobs))
             self._grow_queue(slots * _ample(jobs))
             self._graph = None
-        if graph is not self._graph:
-            wp.synchronize_device()  # before results are read from the new arrays, aside from the steps
 
     def _grow_episodes(self, episodes: int) -> None:
         before, slots = self._episodes, self._slots
